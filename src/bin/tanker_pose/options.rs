@@ -1,0 +1,140 @@
+//! Command-line options that several tools share.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use tanker_pose::estimation::{EstimatorSettings, Initialisation, Refinement};
+use tanker_pose::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
+use tanker_pose::target::MarkerMap;
+
+/// How a pose is found and judged; the same words as the node's parameters.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Estimator")]
+pub struct EstimatorOptions {
+    /// Where the iteration starts
+    #[arg(long, value_enum, default_value_t = Start::Nominal)]
+    initialisation: Start,
+    /// Which estimate is wanted: none is the paper's orthogonal iteration as it is
+    #[arg(long, value_enum, default_value_t = Estimate::MaximumLikelihood)]
+    refinement: Estimate,
+    /// Standard deviation of pixels that bring none, px
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = in_range::<1, 1_000_000>)]
+    pub pixel_sigma_px: f64,
+    /// Fewer points than this give no pose
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(3..))]
+    min_points: u16,
+    /// Probability with which a correct frame passes the chi-squared test
+    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
+    trust_probability: f64,
+    /// Refuse a frame when a second pose is at least this likely; 1: never
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = probability)]
+    max_ambiguity: f64,
+    /// Roll of the tanker relative to the camera's airframe in the nominal attitude, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    nominal_roll_deg: f64,
+    /// Pitch, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    nominal_pitch_deg: f64,
+    /// Yaw, degrees
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    nominal_yaw_deg: f64,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Start {
+    /// `In_M2`: the nominal attitude; 3 points
+    Nominal,
+    /// `In_M1`: the linear camera matrix; 6 points, not in one plane
+    Dlt,
+    /// The last trusted attitude, or the nominal one; 3 points
+    Previous,
+    /// All attitudes; 4 points
+    Global,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Estimate {
+    /// Least squared pixel residuals over their variances
+    MaximumLikelihood,
+    /// The converged orthogonal iteration, with its sandwich covariance
+    None,
+}
+
+impl EstimatorOptions {
+    /// Returns the settings that the options say.
+    pub fn settings(&self) -> EstimatorSettings {
+        EstimatorSettings {
+            initialisation: match self.initialisation {
+                Start::Nominal => Initialisation::Nominal,
+                Start::Dlt => Initialisation::Dlt,
+                Start::Previous => Initialisation::Previous,
+                Start::Global => Initialisation::Global,
+            },
+            refinement: match self.refinement {
+                Estimate::MaximumLikelihood => Refinement::MaximumLikelihood,
+                Estimate::None => Refinement::None,
+            },
+            nominal_camera_from_tanker: optical_from_body()
+                * rotation_from_roll_pitch_yaw(
+                    self.nominal_roll_deg.to_radians(),
+                    self.nominal_pitch_deg.to_radians(),
+                    self.nominal_yaw_deg.to_radians(),
+                ),
+            min_points: usize::from(self.min_points),
+            trust_probability: self.trust_probability,
+            max_ambiguity: self.max_ambiguity,
+            ..EstimatorSettings::default()
+        }
+    }
+}
+
+/// Returns the marker map that an option names: a shipped one, or a file.
+pub fn marker_map(name_or_path: &str) -> Result<MarkerMap, String> {
+    if let Some(map) = MarkerMap::shipped(name_or_path) {
+        return Ok(map);
+    }
+    let text = std::fs::read_to_string(Path::new(name_or_path)).map_err(|error| {
+        format!("{name_or_path}: {error} (expected paper, fin6 or the path of a marker map)")
+    })?;
+    MarkerMap::from_yaml(&text, name_or_path).map_err(|error| error.to_string())
+}
+
+/// Between 0.001 and 1000 by default generics: bounds in thousandths, because a generic cannot be a float.
+fn in_range<const MIN_MILLI: i64, const MAX_MILLI: i64>(text: &str) -> Result<f64, String> {
+    let (min, max) = (MIN_MILLI as f64 * 1e-3, MAX_MILLI as f64 * 1e-3);
+    number(text, min, max)
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    number(text, 0.0, 1.0)
+}
+
+fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
+    let value: f64 = text
+        .parse()
+        .map_err(|_| format!("expected a number, got {text:?}"))?;
+    if (min..=max).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "expected a number from {min} to {max}, got {value}"
+        ))
+    }
+}

@@ -1,0 +1,278 @@
+//! The models `plumb_bob` and `rational_polynomial`.
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+use super::{MAX_ANGLE, MIN_STRETCH, polynomial, solve_rising};
+
+/// Least denominator of the radial ratio: a calibrated one stays of order one, and at 0 is a pole.
+const MIN_DENOMINATOR: f64 = 1.0e-2;
+
+/// A lens with a radial ratio and a tangential part, with `s = x² + y²`:
+/// ```text
+/// L  = (1 + k1 s + k2 s² + k3 s³) / (1 + k4 s + k5 s² + k6 s³)
+/// x' = L x + 2 p1 x y + p2 (s + 2 x²)
+/// y' = L y + p1 (s + 2 y²) + 2 p2 x y
+/// ```
+///
+/// Its derivative is symmetric, so it is the gradient of a potential, and one-to-one on any convex
+/// region where the derivative is positive definite. The valid region is the largest such disc.
+///
+/// # Source
+/// `OpenCV` `projectPoints`; Brown, *Photogrammetric Engineering* 32(3), 1966.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::camera) struct BrownConrady {
+    numerator: [f64; 4],
+    denominator: [f64; 4],
+    p1: f64,
+    p2: f64,
+    /// Radius of the valid disc.
+    max_radius: f64,
+}
+
+impl BrownConrady {
+    /// Returns the lens with finite `radial = [k1, ..., k6]` and `tangential = [p1, p2]`.
+    pub fn new(radial: [f64; 6], tangential: [f64; 2]) -> Self {
+        let [k1, k2, k3, k4, k5, k6] = radial;
+        let [p1, p2] = tangential;
+        let mut lens = Self {
+            numerator: [1.0, k1, k2, k3],
+            denominator: [1.0, k4, k5, k6],
+            p1,
+            p2,
+            max_radius: 0.0,
+        };
+        lens.max_radius = lens.disc_within(lens.radial_limit());
+        lens
+    }
+
+    /// Returns the first radius at which `d(L r)/dr` falls to [`MIN_STRETCH`] or the denominator to
+    /// [`MIN_DENOMINATOR`], at most that of 89°: roots of polynomials in `s`.
+    fn radial_limit(&self) -> f64 {
+        let (n, d) = (&self.numerator[..], &self.denominator[..]);
+        let upper = MAX_ANGLE.tan().powi(2);
+        // d(L r)/dr · D² = N D + 2 s (N' D - N D')
+        let value = polynomial::multiply(n, d);
+        let up = polynomial::multiply(&polynomial::derivative(n), d);
+        let down = polynomial::multiply(n, &polynomial::derivative(d));
+        let square = polynomial::multiply(d, d);
+        let mut slope: Vec<f64> = value
+            .iter()
+            .zip(&square)
+            .map(|(value, square)| value - MIN_STRETCH * square)
+            .collect();
+        for (power, (up, down)) in up.iter().zip(&down).enumerate() {
+            slope[power + 1] += 2.0 * (up - down);
+        }
+        let mut pole = self.denominator;
+        pole[0] -= MIN_DENOMINATOR;
+        [&slope[..], &pole[..]]
+            .into_iter()
+            .filter_map(|limit| polynomial::first_sign_change(limit, upper))
+            .fold(upper, f64::min)
+            .sqrt()
+    }
+
+    /// Returns the radius of the largest disc within `limit` on which every stretch is above [`MIN_STRETCH`].
+    fn disc_within(&self, limit: f64) -> f64 {
+        /// Steps of the search; the condition is smooth, and each point used is checked again anyway.
+        const STEPS: u32 = 4096;
+        if self.p1 == 0.0 && self.p2 == 0.0 {
+            return limit;
+        }
+        let at = |step: u32| limit * f64::from(step) / f64::from(STEPS);
+        // The end itself is at the limit of the radial part, where any tangential part is too much.
+        match (1..=STEPS).find(|&step| !self.stretches_all_around(at(step))) {
+            Some(step) => polynomial::bisect(at(step - 1), at(step), |radius| {
+                self.stretches_all_around(radius)
+            }),
+            None => limit,
+        }
+    }
+
+    /// Returns whether the derivative's eigenvalues are above [`MIN_STRETCH`] on the whole circle.
+    ///
+    /// In the basis outwards and along the circle, at the angle `ψ` from `(p2, p1)`, and with
+    /// `a = r |(p1, p2)|`, the derivative is `[[g' + 6 a cos ψ, 2 a sin ψ], [2 a sin ψ, L + 2 a cos ψ]]`.
+    /// Its determinant is a parabola in `cos ψ`, whose least value over `[-1, 1]` is compared with 0.
+    fn stretches_all_around(&self, radius: f64) -> bool {
+        let square = radius * radius;
+        let (ratio, ratio_by_square) = self.ratio(square);
+        let across = ratio + 2.0 * square * ratio_by_square - MIN_STRETCH;
+        let along = ratio - MIN_STRETCH;
+        let a = radius * self.p1.hypot(self.p2);
+        let unfolded = across > 0.0 && along > 0.0; // false for NaN
+        if !unfolded {
+            return false;
+        }
+        if across + 3.0 * along >= 16.0 * a {
+            across > 6.0 * a && along > 2.0 * a
+        } else {
+            across * along - 4.0 * a * a - (across + 3.0 * along).powi(2) / 16.0 > 0.0
+        }
+    }
+
+    /// Returns `L` and `dL/ds`.
+    fn ratio(&self, square: f64) -> (f64, f64) {
+        let [_, k1, k2, k3] = self.numerator;
+        let [_, k4, k5, k6] = self.denominator;
+        let denominator = polynomial::evaluate(&self.denominator, square);
+        let ratio = polynomial::evaluate(&self.numerator, square) / denominator;
+        let up = polynomial::evaluate(&[k1, 2.0 * k2, 3.0 * k3], square);
+        let down = polynomial::evaluate(&[k4, 2.0 * k5, 3.0 * k6], square);
+        (ratio, (up - ratio * down) / denominator)
+    }
+
+    /// Returns the distorted point and its derivative by the ideal one, valid or not.
+    fn bend(&self, ideal: Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
+        let (x, y, p1, p2) = (ideal.x, ideal.y, self.p1, self.p2);
+        let square = x * x + y * y;
+        let (ratio, slope) = self.ratio(square);
+        let distorted = Point2::new(
+            ratio * x + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x),
+            ratio * y + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y,
+        );
+        let mixed = 2.0 * (slope * x * y + p1 * x + p2 * y);
+        let derivative = Matrix2::new(
+            ratio + 2.0 * slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
+            mixed,
+            mixed,
+            ratio + 2.0 * slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x,
+        );
+        (distorted, derivative)
+    }
+
+    /// Returns the distorted point and its derivative by the ideal one; none outside the valid disc.
+    pub fn distort(&self, ideal: Point2<f64>) -> Option<(Point2<f64>, Matrix2<f64>)> {
+        let valid = ideal.coords.norm_squared() <= self.max_radius * self.max_radius; // false for NaN
+        if !valid {
+            return None;
+        }
+        let (distorted, derivative) = self.bend(ideal);
+        (derivative.determinant() > 0.0 && derivative.trace() > 0.0)
+            .then_some((distorted, derivative))
+    }
+
+    /// Returns the ideal point within the valid disc; the caller verifies it.
+    ///
+    /// The radial part alone gives the start. From there Newton, its steps halved until they stay in
+    /// the disc and lessen the residual, ends when none does: at the solution, if the disc holds it.
+    pub fn undistort(&self, distorted: Point2<f64>) -> Option<Point2<f64>> {
+        /// Convergence is quadratic: five or so suffice, the rest is for the rim.
+        const MAX_STEPS: usize = 60;
+        /// A step of this many halvings is below rounding.
+        const MAX_HALVINGS: usize = 50;
+        let radius = distorted.coords.norm();
+        if radius == 0.0 {
+            return Some(distorted);
+        }
+        let start = solve_rising(radius, self.max_radius, |radius| {
+            let square = radius * radius;
+            let (ratio, slope) = self.ratio(square);
+            (ratio * radius, ratio + 2.0 * square * slope)
+        });
+        let mut ideal = distorted * (start / radius).min(self.max_radius / radius);
+        let residual_at = |point: Point2<f64>| -> (Vector2<f64>, Matrix2<f64>) {
+            let (image, derivative) = self.bend(point);
+            (distorted - image, derivative)
+        };
+        let (mut residual, mut derivative) = residual_at(ideal);
+        for _ in 0..MAX_STEPS {
+            let full = derivative.try_inverse()? * residual;
+            let improved = std::iter::successors(Some(full), |step| Some(step * 0.5))
+                .take(MAX_HALVINGS)
+                .map(|step| ideal + step)
+                .filter(|point| point.coords.norm() <= self.max_radius)
+                .map(|point| (point, residual_at(point)))
+                .find(|(_, (next, _))| next.norm_squared() < residual.norm_squared());
+            let Some((point, next)) = improved else { break };
+            ideal = point;
+            (residual, derivative) = next;
+        }
+        Some(ideal)
+    }
+
+    /// Returns the distorted radius of the valid disc's rim in the direction of a point.
+    pub fn rim_radius(&self, towards: Point2<f64>) -> f64 {
+        let outwards = towards.coords.try_normalize(0.0).unwrap_or_else(Vector2::x);
+        self.bend(Point2::from(outwards * self.max_radius))
+            .0
+            .coords
+            .norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_region_ends_where_the_radius_turns_back() {
+        // d(L r)/dr = 1 - 0.9 r² is MIN_STRETCH at this radius.
+        let turn = ((1.0 - MIN_STRETCH) / 0.9_f64).sqrt();
+        let lens = BrownConrady::new([-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; 2]);
+        assert!((lens.max_radius - turn).abs() < 1.0e-12);
+        // Two stationary radii, of which the first counts: 1 - 5 s + 4 s² at s = 1/4 and 1.
+        let lens = BrownConrady::new([-5.0 / 3.0, 0.8, 0.0, 0.0, 0.0, 0.0], [0.0; 2]);
+        assert!((lens.max_radius - 0.5).abs() < MIN_STRETCH);
+    }
+
+    #[test]
+    fn a_rising_radius_is_valid_to_89_degrees() {
+        let lens = BrownConrady::new([-0.3, 0.1, 0.0, 0.0, 0.0, 0.0], [0.0; 2]);
+        assert!((lens.max_radius - 89.0_f64.to_radians().tan()).abs() < 1.0e-9);
+    }
+
+    #[test]
+    fn the_region_ends_before_a_pole() {
+        // The denominator 1 - s is MIN_DENOMINATOR here, and the ratio rises all the way.
+        let lens = BrownConrady::new([0.0, 0.0, 0.0, -1.0, 0.0, 0.0], [0.0; 2]);
+        assert!((lens.max_radius - (1.0 - MIN_DENOMINATOR).sqrt()).abs() < 1.0e-12);
+    }
+
+    #[test]
+    fn a_tangential_part_alone_is_valid_up_to_its_own_fold() {
+        // Straight against (p2, p1) the stretches are 1 - 6 a and 1 - 2 a; 4 > 16 a there, so it is the worst.
+        let limit = (1.0 - MIN_STRETCH) / 6.0 / 0.01;
+        let lens = BrownConrady::new([0.0; 6], [0.01, 0.0]);
+        assert!(
+            (lens.max_radius - limit).abs() < 1.0e-9,
+            "{}",
+            lens.max_radius
+        );
+    }
+
+    proptest! {
+        /// The claim behind "one-to-one": positive definite everywhere in the disc, to rounding.
+        #[test]
+        fn every_stretch_in_the_disc_is_above_the_limit(
+            radial in prop::array::uniform6(-1.0_f64..1.0),
+            tangential in prop::array::uniform2(-0.1_f64..0.1),
+            part in 0.0_f64..1.0,
+            angle in 0.0_f64..std::f64::consts::TAU,
+        ) {
+            let lens = BrownConrady::new(radial, tangential);
+            let radius = part * lens.max_radius;
+            let (_, derivative) = lens.bend(Point2::new(radius * angle.cos(), radius * angle.sin()));
+            let eigenvalues = derivative.symmetric_eigenvalues();
+            prop_assert!(eigenvalues.min() > MIN_STRETCH * 0.999, "{} at {}", eigenvalues.min(), radius);
+        }
+
+        /// And it is the largest such disc: just outside, some direction falls below the limit.
+        #[test]
+        fn beyond_the_disc_some_stretch_is_below_the_limit(
+            radial in prop::array::uniform3(-1.0_f64..1.0),
+            tangential in prop::array::uniform2(-0.1_f64..0.1),
+        ) {
+            let lens = BrownConrady::new([radial[0], radial[1], radial[2], 0.0, 0.0, 0.0], tangential);
+            prop_assume!(lens.max_radius < 57.0);
+            let radius = 1.001 * lens.max_radius;
+            let least = (0..3600)
+                .map(|tenth| f64::from(tenth).to_radians() / 10.0)
+                .map(|angle| lens.bend(Point2::new(radius * angle.cos(), radius * angle.sin())).1)
+                .map(|derivative| derivative.symmetric_eigenvalues().min())
+                .fold(f64::INFINITY, f64::min);
+            prop_assert!(least < MIN_STRETCH * 1.001, "{} at {}", least, radius);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Why a camera info can't be used, and why a pixel has no ray.
+
+/// Why a camera info cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "a variant's message names its fields")]
+pub enum CameraError {
+    /// All zero intrinsics: how ROS marks a camera that was never calibrated.
+    #[error("the camera is not calibrated (k[0] is {fx})")]
+    NotCalibrated { fx: f64 },
+    /// Rectified pixels are announced, but the projection of the rectified image is left zero.
+    #[error("the camera has no projection for rectified pixels (p[0] is {fx})")]
+    NoProjection { fx: f64 },
+    /// A number that is used is NaN or infinite.
+    #[error("{array}[{index}] must be finite, got {value}")]
+    NotFinite {
+        array: &'static str,
+        index: usize,
+        value: f64,
+    },
+    /// A focal length that no lens has: negative, not in pixels, or a slipped digit.
+    #[error("{array}[{index}], a focal length, must be {min} to {max:e} px, got {value}")]
+    FocalLength {
+        array: &'static str,
+        index: usize,
+        value: f64,
+        min: f64,
+        max: f64,
+    },
+    /// A principal point so far away that it can't be one.
+    #[error(
+        "{array}[{index}], the principal point, must be within {limit:e} px of the image, got {value}"
+    )]
+    PrincipalPoint {
+        array: &'static str,
+        index: usize,
+        value: f64,
+        limit: f64,
+    },
+    /// An entry that the form of the matrix fixes; `k[1]` and `p[1]` would be skew, which is not supported.
+    #[error("{array}[{index}] must be {expected}, got {value}")]
+    FixedEntry {
+        array: &'static str,
+        index: usize,
+        expected: f64,
+        value: f64,
+    },
+    /// The projection belongs to a stereo pair's second camera.
+    #[error(
+        "p[{index}] must be 0, got {value}: it holds a stereo pair's baseline, and the projection of one camera is needed"
+    )]
+    Baseline { index: usize, value: f64 },
+    /// A lens that we have no formula for.
+    #[error("distortion model `{model}` with d = {d:?} is not known; known are {known}")]
+    UnknownDistortionModel {
+        model: String,
+        d: Vec<f64>,
+        known: &'static str,
+    },
+    /// More or fewer coefficients than the lens model has.
+    #[error("distortion model `{model}` needs {need} coefficients, got {got}: d = {d:?}")]
+    CoefficientCount {
+        model: String,
+        need: &'static str,
+        got: usize,
+        d: Vec<f64>,
+    },
+    /// A coefficient that no calibration gives.
+    #[error("d[{index}] must be within {limit:e}, got {value}")]
+    CoefficientTooLarge {
+        index: usize,
+        value: f64,
+        limit: f64,
+    },
+    /// Only one side of the image is known.
+    #[error(
+        "image width and height must both be positive, or both 0 for unknown, got {width}x{height}"
+    )]
+    ImageSize { width: u32, height: u32 },
+    /// A region of interest without pixels that is not the all-zero region, which means the whole image.
+    #[error("the region of interest has no pixels: {width}x{height} at ({x_offset}, {y_offset})")]
+    EmptyRegion {
+        width: u32,
+        height: u32,
+        x_offset: u32,
+        y_offset: u32,
+    },
+    /// A region of interest that reaches beyond the image.
+    #[error(
+        "the region of interest, {width}x{height} at ({x_offset}, {y_offset}), reaches beyond the image of {image_width}x{image_height}"
+    )]
+    RegionOutsideImage {
+        width: u32,
+        height: u32,
+        x_offset: u32,
+        y_offset: u32,
+        image_width: u32,
+        image_height: u32,
+    },
+    /// Binning that leaves no pixel.
+    #[error("binning {binning_x}x{binning_y} leaves no pixel of {width}x{height}")]
+    BinningTooLarge {
+        binning_x: u32,
+        binning_y: u32,
+        width: u32,
+        height: u32,
+    },
+}
+
+/// Why a pixel has no ray.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "a variant's message names its fields")]
+pub enum UndistortError {
+    /// The pixel is NaN or infinite, or so large that its ray is.
+    #[error("pixel ({u}, {v}) must be finite and have a finite ray")]
+    NotFinite { u: f64, v: f64 },
+    /// No ray that the lens model was made for falls on this pixel.
+    #[error(
+        "pixel ({u}, {v}) lies outside the valid region of the lens model: its distorted radius is \
+         {radius:.6} on the plane z = 1, the model reaches {max_radius:.6} in this direction"
+    )]
+    OutsideValidRegion {
+        u: f64,
+        v: f64,
+        radius: f64,
+        max_radius: f64,
+    },
+}

@@ -1,0 +1,313 @@
+//! The plain data of `sensor_msgs/CameraInfo`, and what its numbers mean.
+
+use super::distortion::{BrownConrady, Equidistant, Lens};
+use super::{Camera, CameraError};
+
+/// `sensor_msgs/CameraInfo` without its header, as plain data: nothing is checked yet.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CameraInfo {
+    /// Image height at full resolution, px.
+    pub height: u32,
+    /// Image width at full resolution, px.
+    pub width: u32,
+    /// `plumb_bob`, `rational_polynomial`, `equidistant`, or empty.
+    pub distortion_model: String,
+    /// Distortion coefficients in the model's order.
+    pub d: Vec<f64>,
+    /// Intrinsics of the raw image, row-major.
+    pub k: [f64; 9],
+    /// Rectification rotation, row-major.
+    pub r: [f64; 9],
+    /// Projection of the rectified image, row-major 3×4.
+    pub p: [f64; 12],
+    /// Columns combined into one; 0 means 1.
+    pub binning_x: u32,
+    /// Rows combined into one; 0 means 1.
+    pub binning_y: u32,
+    /// Part of the sensor that was read out.
+    pub roi: RegionOfInterest,
+}
+
+/// `sensor_msgs/RegionOfInterest`, in unbinned full-resolution pixels; all zero means the whole image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RegionOfInterest {
+    /// Leftmost column.
+    pub x_offset: u32,
+    /// Topmost row.
+    pub y_offset: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Width, px.
+    pub width: u32,
+    /// Whether a separate rectified region is meant.
+    pub do_rectify: bool,
+}
+
+/// Least focal length, px: below it the numbers are not in pixels.
+const MIN_FOCAL_LENGTH_PX: f64 = 1.0;
+/// Largest focal length, px: a metre-long lens on one-micrometre pixels.
+const MAX_FOCAL_LENGTH_PX: f64 = 1.0e6;
+/// Farthest principal point, px: a region of interest may lie far from it, but on some sensor.
+const MAX_PRINCIPAL_POINT_PX: f64 = 1.0e6;
+/// Largest distortion coefficient: those of long lenses are large, their rays being close to the axis.
+const MAX_COEFFICIENT: f64 = 1.0e9;
+/// How far an entry fixed by a matrix's form may be off: rounding of a program that computed it.
+const FIXED_ENTRY_TOLERANCE: f64 = 1.0e-9;
+
+/// The models that we have formulas for.
+const KNOWN_MODELS: &str = "plumb_bob, rational_polynomial, equidistant";
+
+/// Parts of the names that vendors give to fisheye models, which bend rays even when all coefficients
+/// are 0: such a name is never taken for "no distortion".
+const FISHEYE_NAMES: [&str; 6] = ["fish", "equi", "kannala", "omni", "theta", "stereographic"];
+
+/// Returns the checked camera; see [`Camera::from_info`].
+pub(super) fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, CameraError> {
+    // ROS marks an uncalibrated camera by k[0] alone, whichever matrix is used.
+    if info.k[0] == 0.0 {
+        return Err(CameraError::NotCalibrated { fx: info.k[0] });
+    }
+    let (intrinsics, lens) = if rectified {
+        (projection(&info.p)?, None)
+    } else {
+        (
+            camera_matrix(&info.k)?,
+            lens(&info.distortion_model, &info.d)?,
+        )
+    };
+    let image_size_px = image_size(info)?;
+    let [fx, fy, cx, cy] = intrinsics;
+    let (binning_x, binning_y) = (
+        f64::from(info.binning_x.max(1)),
+        f64::from(info.binning_y.max(1)),
+    );
+    Ok(Camera {
+        fx: fx / binning_x,
+        fy: fy / binning_y,
+        cx: (cx - f64::from(info.roi.x_offset)) / binning_x,
+        cy: (cy - f64::from(info.roi.y_offset)) / binning_y,
+        image_size_px,
+        lens,
+    })
+}
+
+/// Returns `[fx, fy, cx, cy]` of K.
+fn camera_matrix(k: &[f64; 9]) -> Result<[f64; 4], CameraError> {
+    check_finite("k", k)?;
+    check_fixed("k", k, &[(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)])?;
+    check_intrinsics("k", k, [0, 4, 2, 5])
+}
+
+/// Returns `[fx, fy, cx, cy]` of P.
+fn projection(p: &[f64; 12]) -> Result<[f64; 4], CameraError> {
+    if p[0] == 0.0 {
+        return Err(CameraError::NoProjection { fx: p[0] });
+    }
+    check_finite("p", p)?;
+    for index in [3, 7] {
+        if p[index].abs() > FIXED_ENTRY_TOLERANCE {
+            return Err(CameraError::Baseline {
+                index,
+                value: p[index],
+            });
+        }
+    }
+    check_fixed(
+        "p",
+        p,
+        &[(1, 0.0), (4, 0.0), (8, 0.0), (9, 0.0), (10, 1.0), (11, 0.0)],
+    )?;
+    check_intrinsics("p", p, [0, 5, 2, 6])
+}
+
+fn check_finite(array: &'static str, values: &[f64]) -> Result<(), CameraError> {
+    match values
+        .iter()
+        .enumerate()
+        .find(|(_, value)| !value.is_finite())
+    {
+        Some((index, &value)) => Err(CameraError::NotFinite {
+            array,
+            index,
+            value,
+        }),
+        None => Ok(()),
+    }
+}
+
+fn check_fixed(
+    array: &'static str,
+    values: &[f64],
+    fixed: &[(usize, f64)],
+) -> Result<(), CameraError> {
+    for &(index, expected) in fixed {
+        let value = values[index];
+        if (value - expected).abs() > FIXED_ENTRY_TOLERANCE {
+            return Err(CameraError::FixedEntry {
+                array,
+                index,
+                expected,
+                value,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Returns the values at the indices of fx, fy, cx, cy.
+fn check_intrinsics(
+    array: &'static str,
+    values: &[f64],
+    indices: [usize; 4],
+) -> Result<[f64; 4], CameraError> {
+    let (min, max) = (MIN_FOCAL_LENGTH_PX, MAX_FOCAL_LENGTH_PX);
+    for &index in &indices[..2] {
+        let value = values[index];
+        if !(min..=max).contains(&value) {
+            return Err(CameraError::FocalLength {
+                array,
+                index,
+                value,
+                min,
+                max,
+            });
+        }
+    }
+    for &index in &indices[2..] {
+        let value = values[index];
+        if value.abs() > MAX_PRINCIPAL_POINT_PX {
+            return Err(CameraError::PrincipalPoint {
+                array,
+                index,
+                value,
+                limit: MAX_PRINCIPAL_POINT_PX,
+            });
+        }
+    }
+    Ok(indices.map(|index| values[index]))
+}
+
+/// Returns the lens of the raw image; none when it does not distort.
+fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
+    check_finite("d", d)?;
+    if let Some((index, &value)) = d
+        .iter()
+        .enumerate()
+        .find(|(_, value)| value.abs() > MAX_COEFFICIENT)
+    {
+        return Err(CameraError::CoefficientTooLarge {
+            index,
+            value,
+            limit: MAX_COEFFICIENT,
+        });
+    }
+    let count = |need: &'static str| {
+        Err(CameraError::CoefficientCount {
+            model: model.to_owned(),
+            need,
+            got: d.len(),
+            d: d.to_vec(),
+        })
+    };
+    let all_zero = d.iter().all(|&value| value == 0.0);
+    match (model, d) {
+        ("equidistant", &[k1, k2, k3, k4]) => {
+            Ok(Some(Lens::Equidistant(Equidistant::new([k1, k2, k3, k4]))))
+        }
+        ("equidistant", _) => count("4"),
+        ("plumb_bob" | "rational_polynomial", _) if all_zero => Ok(None),
+        ("plumb_bob", &[k1, k2, p1, p2]) => {
+            Ok(Some(brown_conrady([k1, k2, 0.0, 0.0, 0.0, 0.0], [p1, p2])))
+        }
+        ("plumb_bob", &[k1, k2, p1, p2, k3]) => {
+            Ok(Some(brown_conrady([k1, k2, k3, 0.0, 0.0, 0.0], [p1, p2])))
+        }
+        ("plumb_bob", _) => count("4 or 5"),
+        // OpenCV's longer vectors go on with thin prism and tilt, which ROS's model does not have.
+        ("rational_polynomial", &[k1, k2, p1, p2, k3, k4, k5, k6, ref rest @ ..])
+            if rest.iter().all(|&value| value == 0.0) =>
+        {
+            Ok(Some(brown_conrady([k1, k2, k3, k4, k5, k6], [p1, p2])))
+        }
+        ("rational_polynomial", _) => count("8 (more if the others are 0)"),
+        _ if all_zero && !names_a_fisheye(model) => Ok(None),
+        _ => Err(CameraError::UnknownDistortionModel {
+            model: model.to_owned(),
+            d: d.to_vec(),
+            known: KNOWN_MODELS,
+        }),
+    }
+}
+
+fn brown_conrady(radial: [f64; 6], tangential: [f64; 2]) -> Lens {
+    Lens::BrownConrady(BrownConrady::new(radial, tangential))
+}
+
+fn names_a_fisheye(model: &str) -> bool {
+    let model = model.to_lowercase();
+    FISHEYE_NAMES.iter().any(|part| model.contains(part))
+}
+
+/// Returns the image size that detections see; none when it is not known.
+fn image_size(info: &CameraInfo) -> Result<Option<(u32, u32)>, CameraError> {
+    let full = full_size(info.width, info.height)?;
+    let RegionOfInterest {
+        x_offset,
+        y_offset,
+        width,
+        height,
+        do_rectify: _,
+    } = info.roi;
+    let read_out = if (x_offset, y_offset, width, height) == (0, 0, 0, 0) {
+        full
+    } else {
+        if width == 0 || height == 0 {
+            return Err(CameraError::EmptyRegion {
+                width,
+                height,
+                x_offset,
+                y_offset,
+            });
+        }
+        if let Some((image_width, image_height)) = full {
+            let right = u64::from(x_offset) + u64::from(width);
+            let bottom = u64::from(y_offset) + u64::from(height);
+            if right > u64::from(image_width) || bottom > u64::from(image_height) {
+                return Err(CameraError::RegionOutsideImage {
+                    width,
+                    height,
+                    x_offset,
+                    y_offset,
+                    image_width,
+                    image_height,
+                });
+            }
+        }
+        Some((width, height))
+    };
+    let Some((width, height)) = read_out else {
+        return Ok(None);
+    };
+    let binned = (
+        width / info.binning_x.max(1),
+        height / info.binning_y.max(1),
+    );
+    if binned.0 == 0 || binned.1 == 0 {
+        let (binning_x, binning_y) = (info.binning_x, info.binning_y);
+        return Err(CameraError::BinningTooLarge {
+            binning_x,
+            binning_y,
+            width,
+            height,
+        });
+    }
+    Ok(Some(binned))
+}
+
+fn full_size(width: u32, height: u32) -> Result<Option<(u32, u32)>, CameraError> {
+    match (width, height) {
+        (0, 0) => Ok(None),
+        (0, _) | (_, 0) => Err(CameraError::ImageSize { width, height }),
+        _ => Ok(Some((width, height))),
+    }
+}

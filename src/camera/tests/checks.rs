@@ -1,0 +1,244 @@
+//! Every reason for which a camera info is refused.
+
+use super::super::{Camera, CameraError, CameraInfo, RegionOfInterest};
+use super::info;
+
+/// A sound camera info, raw and rectified, to be spoilt.
+fn sound() -> CameraInfo {
+    CameraInfo {
+        p: [
+            571.0, 0.0, 254.0, 0.0, 0.0, 569.0, 206.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+        ],
+        ..info("plumb_bob", &[-0.2, 0.05, 0.0, 0.0, 0.0])
+    }
+}
+
+fn refusal(rectified: bool, spoil: impl FnOnce(&mut CameraInfo)) -> CameraError {
+    let mut info = sound();
+    spoil(&mut info);
+    Camera::from_info(&info, rectified).expect_err("this camera info is wrong")
+}
+
+fn raw(spoil: impl FnOnce(&mut CameraInfo)) -> String {
+    refusal(false, spoil).to_string()
+}
+
+fn rectified(spoil: impl FnOnce(&mut CameraInfo)) -> String {
+    refusal(true, spoil).to_string()
+}
+
+#[test]
+fn the_unspoilt_camera_info_passes() {
+    assert!(Camera::from_info(&sound(), false).is_ok());
+    assert!(Camera::from_info(&sound(), true).is_ok());
+}
+
+#[test]
+fn a_camera_that_is_not_calibrated_is_refused() {
+    let message = "the camera is not calibrated (k[0] is 0)";
+    assert_eq!(raw(|info| *info = CameraInfo::default()), message);
+    assert_eq!(raw(|info| info.k[0] = 0.0), message);
+    assert_eq!(rectified(|info| info.k = [0.0; 9]), message);
+    assert_eq!(
+        rectified(|info| info.p = [0.0; 12]),
+        "the camera has no projection for rectified pixels (p[0] is 0)"
+    );
+}
+
+#[test]
+fn anything_used_that_is_not_finite_is_refused() {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for index in 0..9 {
+            let error = refusal(false, |info| info.k[index] = value);
+            assert!(
+                matches!(error, CameraError::NotFinite { array: "k", index: i, .. } if i == index),
+                "{error}"
+            );
+        }
+        for index in 0..12 {
+            let error = refusal(true, |info| info.p[index] = value);
+            assert!(
+                matches!(error, CameraError::NotFinite { array: "p", index: i, .. } if i == index),
+                "{error}"
+            );
+        }
+        for index in 0..5 {
+            let error = refusal(false, |info| info.d[index] = value);
+            assert!(
+                matches!(error, CameraError::NotFinite { array: "d", index: i, .. } if i == index),
+                "{error}"
+            );
+        }
+    }
+    assert_eq!(
+        raw(|info| info.k[2] = f64::NAN),
+        "k[2] must be finite, got NaN"
+    );
+}
+
+#[test]
+fn focal_lengths_that_no_lens_has_are_refused() {
+    assert_eq!(
+        raw(|info| info.k[0] = -571.0),
+        "k[0], a focal length, must be 1 to 1e6 px, got -571"
+    );
+    assert_eq!(
+        raw(|info| info.k[4] = 0.0),
+        "k[4], a focal length, must be 1 to 1e6 px, got 0"
+    );
+    assert_eq!(
+        raw(|info| info.k[4] = 0.008),
+        "k[4], a focal length, must be 1 to 1e6 px, got 0.008"
+    );
+    assert_eq!(
+        rectified(|info| info.p[5] = 1.0e9),
+        "p[5], a focal length, must be 1 to 1e6 px, got 1000000000"
+    );
+}
+
+#[test]
+fn a_principal_point_may_lie_outside_the_image_but_not_anywhere() {
+    let mut far = sound();
+    far.k[2] = -3000.0;
+    assert!(Camera::from_info(&far, false).is_ok());
+    assert_eq!(
+        raw(|info| info.k[5] = -1.5e6),
+        "k[5], the principal point, must be within 1e6 px of the image, got -1500000"
+    );
+}
+
+#[test]
+fn skew_and_entries_that_a_matrix_fixes_are_refused() {
+    assert_eq!(raw(|info| info.k[1] = 0.5), "k[1] must be 0, got 0.5");
+    assert_eq!(raw(|info| info.k[8] = 0.0), "k[8] must be 1, got 0");
+    for index in [1, 3, 6, 7, 8] {
+        assert!(matches!(
+            refusal(false, |info| info.k[index] = 2.0),
+            CameraError::FixedEntry { array: "k", .. }
+        ));
+    }
+    for index in [1, 4, 8, 9, 10, 11] {
+        assert!(matches!(
+            refusal(true, |info| info.p[index] = 2.0),
+            CameraError::FixedEntry { array: "p", .. }
+        ));
+    }
+}
+
+#[test]
+fn the_projection_of_a_stereo_pair_is_refused() {
+    assert_eq!(
+        rectified(|info| info.p[3] = -68.5),
+        "p[3] must be 0, got -68.5: it holds a stereo pair's baseline, and the projection of one camera is needed"
+    );
+    assert!(matches!(
+        refusal(true, |info| info.p[7] = 1.0),
+        CameraError::Baseline { index: 7, .. }
+    ));
+}
+
+#[test]
+fn an_unknown_lens_is_refused_by_name() {
+    assert_eq!(
+        raw(|info| info.distortion_model = "division".to_owned()),
+        "distortion model `division` with d = [-0.2, 0.05, 0.0, 0.0, 0.0] is not known; known are plumb_bob, \
+         rational_polynomial, equidistant"
+    );
+    assert!(matches!(
+        refusal(false, |info| info.distortion_model.clear()),
+        CameraError::UnknownDistortionModel { .. }
+    ));
+}
+
+#[test]
+fn another_number_of_coefficients_than_the_lens_has_is_refused() {
+    let with = |model: &str, d: &[f64]| {
+        let info = CameraInfo {
+            distortion_model: model.to_owned(),
+            d: d.to_vec(),
+            ..sound()
+        };
+        Camera::from_info(&info, false)
+    };
+    assert_eq!(
+        with("plumb_bob", &[-0.2, 0.05, 0.0])
+            .expect_err("too few")
+            .to_string(),
+        "distortion model `plumb_bob` needs 4 or 5 coefficients, got 3: d = [-0.2, 0.05, 0.0]"
+    );
+    assert!(with("plumb_bob", &[-0.2, 0.05, 0.0, 0.0]).is_ok());
+    assert!(with("plumb_bob", &[-0.2, 0.05, 0.0, 0.0, 0.0, 0.1]).is_err());
+    assert!(with("rational_polynomial", &[-0.2; 5]).is_err());
+    assert!(with("rational_polynomial", &[0.01; 8]).is_ok());
+    let longer = |last: f64| {
+        [
+            0.01, 0.01, 0.0, 0.0, 0.01, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0, last,
+        ]
+    };
+    assert!(with("rational_polynomial", &longer(0.0)).is_ok());
+    assert!(matches!(
+        with("rational_polynomial", &longer(0.1)),
+        Err(CameraError::CoefficientCount { got: 12, .. })
+    ));
+    for count in [0, 3, 5, 8] {
+        assert!(with("equidistant", &vec![0.01; count]).is_err(), "{count}");
+    }
+    assert!(with("equidistant", &[0.01; 4]).is_ok());
+}
+
+#[test]
+fn a_coefficient_that_no_calibration_gives_is_refused() {
+    assert_eq!(
+        raw(|info| info.d[1] = -1.0e12),
+        "d[1] must be within 1e9, got -1000000000000"
+    );
+}
+
+#[test]
+fn an_image_with_one_side_is_refused() {
+    assert_eq!(
+        raw(|info| info.width = 0),
+        "image width and height must both be positive, or both 0 for unknown, got 0x412"
+    );
+}
+
+#[test]
+fn regions_without_pixels_or_beyond_the_image_are_refused() {
+    let region = |x_offset, y_offset, width, height| {
+        raw(|info| {
+            info.roi = RegionOfInterest {
+                x_offset,
+                y_offset,
+                width,
+                height,
+                do_rectify: false,
+            }
+        })
+    };
+    assert_eq!(
+        region(0, 0, 100, 0),
+        "the region of interest has no pixels: 100x0 at (0, 0)"
+    );
+    assert_eq!(
+        region(0, 0, 0, 100),
+        "the region of interest has no pixels: 0x100 at (0, 0)"
+    );
+    assert_eq!(
+        region(10, 0, 0, 0),
+        "the region of interest has no pixels: 0x0 at (10, 0)"
+    );
+    assert_eq!(
+        region(9, 0, 500, 412),
+        "the region of interest, 500x412 at (9, 0), reaches beyond the image of 508x412"
+    );
+    assert!(region(0, 1, 508, 412).contains("reaches beyond"));
+    assert!(region(u32::MAX, 0, u32::MAX, 1).contains("reaches beyond"));
+}
+
+#[test]
+fn binning_that_leaves_no_pixel_is_refused() {
+    assert_eq!(
+        raw(|info| info.binning_y = 413),
+        "binning 0x413 leaves no pixel of 508x412"
+    );
+}

@@ -1,0 +1,66 @@
+//! What the noise of the pixels does to a pose that is not the maximum likelihood one.
+
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
+
+use super::Observation;
+use super::collinearity::{Symmetric3, object_space_weight};
+use super::refine::CentredPose;
+use crate::camera::{Camera, Ray};
+use crate::geometry::skew;
+
+/// Returns the covariance of a converged orthogonal iteration, rotation before position of the
+/// markers' mean; none when the points do not fix the pose.
+///
+/// The iteration minimises an error whose weights are not those of the noise, so its covariance is
+/// the sandwich `H⁻¹ B H⁻¹` and not the inverse of its own curvature: `J = [−[R p]×, I]`,
+/// `H = Σ JᵀWJ`, `B = Σ z² JᵀW C WJ`, `C` the covariance of the measured ray `(x, y, 1)`.
+pub(crate) fn sandwich(
+    camera: &Camera,
+    observations: &[Observation],
+    markers_mean: &Point3<f64>,
+    pose: &CentredPose,
+) -> Option<Matrix6<f64>> {
+    let mut curvature = Matrix6::zeros();
+    let mut scatter = Matrix6::zeros();
+    for observation in observations {
+        let ray = camera.ray_from_pixel(observation.pixel).ok()?;
+        let arm = pose.rotation * (observation.marker_in_tanker - markers_mean);
+        let depth = arm.z + pose.centre_in_camera.z;
+        let mut j = SMatrix::<f64, 3, 6>::zeros();
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-skew(arm));
+        j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+        let wj = full(&object_space_weight(ray)) * j;
+        curvature += j.transpose() * wj;
+        let noise = ray_noise(camera, ray, observation.sigma_px)? * depth;
+        let half = noise.transpose() * wj;
+        scatter += half.transpose() * half;
+    }
+    let inverse = curvature.cholesky()?.inverse();
+    let covariance = inverse * scatter * inverse;
+    covariance
+        .iter()
+        .all(|value| value.is_finite())
+        .then_some(covariance)
+}
+
+/// Returns the information (inverse covariance) of a measured ray's two coordinates: 11, 12, 22.
+#[inline]
+pub(crate) fn ray_information(camera: &Camera, ray: Ray, sigma_px: f64) -> Option<[f64; 3]> {
+    let (_, pixel_by_ray) = camera.project(ray)?;
+    let whitened = pixel_by_ray / sigma_px;
+    let information: Matrix2<f64> = whitened.tr_mul(&whitened);
+    Some([information.m11, information.m12, information.m22])
+}
+
+/// A square root of the measured ray's covariance, no unit.
+fn ray_noise(camera: &Camera, ray: Ray, sigma_px: f64) -> Option<Matrix3x2<f64>> {
+    let (_, pixel_by_ray) = camera.project(ray)?;
+    let ray_by_pixel = pixel_by_ray.try_inverse()? * sigma_px;
+    let mut noise = Matrix3x2::zeros();
+    noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&ray_by_pixel);
+    Some(noise)
+}
+
+fn full(s: &Symmetric3) -> Matrix3<f64> {
+    Matrix3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5])
+}

@@ -1,0 +1,209 @@
+//! The one call that turns observations into a judged pose.
+
+use nalgebra::Rotation3;
+
+use super::ambiguity::{self, is_same, likelihood_ratio};
+use super::collinearity::CollinearityCost;
+use super::initialise::{front_minima, linear_rotation};
+use super::problem::Problem;
+use super::refine::Fit;
+use super::trust::TrustLimits;
+use super::{
+    EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Refinement, Solution,
+};
+use crate::camera::{Camera, Ray};
+use crate::geometry::PoseCovariance;
+
+/// Settings with what can be computed once: the limits of the chi-squared test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimator {
+    settings: EstimatorSettings,
+    limits: TrustLimits,
+}
+
+/// A fit with what is known about its rivals.
+struct Candidate {
+    fit: Fit,
+    rival_chi_squared: Option<f64>,
+    iterations: u16,
+    initialisation: Initialisation,
+}
+
+impl Estimator {
+    /// Returns an estimator with these settings.
+    #[must_use]
+    pub fn new(settings: EstimatorSettings) -> Self {
+        let limits = TrustLimits::new(settings.trust_probability);
+        Self { settings, limits }
+    }
+
+    /// Returns the settings in force.
+    #[must_use]
+    pub fn settings(&self) -> &EstimatorSettings {
+        &self.settings
+    }
+
+    /// Returns the pose that explains the observations best, with its covariance and the numbers to
+    /// judge it by; whether to trust it is [`Solution::is_trusted`] and `ambiguity`.
+    ///
+    /// # Inputs
+    /// * `observations`: each marker once, in any order, finite, sigmas above zero.
+    /// * `previous`: the last trusted rotation of `camera_from_tanker`, used by
+    ///   [`Initialisation::Previous`] only.
+    ///
+    /// # Errors
+    /// Any [`EstimateError`]: too few points, points that fix no pose, a pixel without a ray, no
+    /// minimum, a marker behind the camera.
+    pub fn estimate(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        previous: Option<&Rotation3<f64>>,
+    ) -> Result<Solution, EstimateError> {
+        let start = self.settings.initialisation;
+        let need = self.settings.min_points.max(start.min_points());
+        if observations.len() < need {
+            return Err(EstimateError::TooFewPoints {
+                got: observations.len(),
+                need,
+            });
+        }
+        let problem = Problem::new(camera, self.settings.refinement, observations);
+        let cost = problem.cost(observations)?;
+        let nominal = || {
+            let seed = &self.settings.nominal_camera_from_tanker;
+            self.solve_from(&problem, observations, &cost, seed, Initialisation::Nominal)
+        };
+        match (start, previous) {
+            (Initialisation::Previous, Some(seed)) => {
+                match self.solve_from(&problem, observations, &cost, seed, start) {
+                    Ok(solution) if solution.is_trusted() => Ok(solution),
+                    // A tanker that turned meanwhile, or a last pose that was wrong: begin anew.
+                    _ => nominal(),
+                }
+            }
+            (Initialisation::Nominal | Initialisation::Previous, _) => nominal(),
+            (Initialisation::Dlt, _) => {
+                let seed = dlt_seed(camera, observations)?;
+                self.solve_from(&problem, observations, &cost, &seed, start)
+            }
+            (Initialisation::Global, _) => {
+                let candidate = globally(&problem, observations, &cost)?;
+                Ok(self.judge(&problem, observations, &candidate))
+            }
+        }
+    }
+
+    fn solve_from(
+        &self,
+        problem: &Problem,
+        observations: &[Observation],
+        cost: &CollinearityCost,
+        seed: &Rotation3<f64>,
+        initialisation: Initialisation,
+    ) -> Result<Solution, EstimateError> {
+        let minimum = problem.descend(cost, seed)?;
+        let fit = problem.fit(observations, cost, &minimum.rotation)?;
+        let rival = ambiguity::rival(problem, observations, cost, &fit.pose);
+        let candidate = Candidate {
+            fit,
+            rival_chi_squared: rival.map(|rival| rival.chi_squared),
+            iterations: minimum.iterations.saturating_add(fit.iterations),
+            initialisation,
+        };
+        Ok(self.judge(problem, observations, &candidate))
+    }
+
+    fn judge(
+        &self,
+        problem: &Problem,
+        observations: &[Observation],
+        candidate: &Candidate,
+    ) -> Solution {
+        let fit = &candidate.fit;
+        let degrees_of_freedom = 2 * observations.len() - 6;
+        let lever = fit.pose.rotation * problem.markers_mean.coords;
+        Solution {
+            camera_from_tanker: problem.pose(fit),
+            covariance: PoseCovariance::from_point(&fit.covariance, &lever),
+            rms_px: problem.rms_px(observations, fit),
+            chi_squared: fit.chi_squared,
+            degrees_of_freedom: u16::try_from(degrees_of_freedom).unwrap_or(u16::MAX),
+            chi_squared_limit: self.limits.limit(degrees_of_freedom),
+            iterations: candidate.iterations,
+            initialisation: candidate.initialisation,
+            ambiguity: candidate
+                .rival_chi_squared
+                .map_or(0.0, |rival| likelihood_ratio(rival, fit.chi_squared)),
+            excluded: Excluded::default(),
+        }
+    }
+}
+
+fn dlt_seed(
+    camera: &Camera,
+    observations: &[Observation],
+) -> Result<Rotation3<f64>, EstimateError> {
+    let rays = observations
+        .iter()
+        .map(|o| {
+            camera
+                .ray_from_pixel(o.pixel)
+                .map_err(|cause| EstimateError::NoRay { id: o.id, cause })
+        })
+        .collect::<Result<Vec<Ray>, _>>()?;
+    let markers: Vec<_> = observations.iter().map(|o| o.marker_in_tanker).collect();
+    linear_rotation(&rays, &markers)
+}
+
+/// The best of all minima in front of the camera, and the second best as its rival.
+fn globally(
+    problem: &Problem,
+    observations: &[Observation],
+    cost: &CollinearityCost,
+) -> Result<Candidate, EstimateError> {
+    let (minima, mut iterations) = front_minima(cost, problem.step_tolerance());
+    let mut best: Option<(Fit, f64)> = None;
+    let mut rival_merit: Option<(Fit, f64)> = None;
+    let mut failure = EstimateError::NoConvergence { iterations };
+    let mut consider = |fit: Fit, merit: f64| match &best {
+        Some((known, _)) if is_same(&known.pose.rotation, &fit.pose.rotation) => {}
+        Some((_, best_merit)) if *best_merit <= merit => {
+            if rival_merit.as_ref().is_none_or(|(_, rival)| merit < *rival) {
+                rival_merit = Some((fit, merit));
+            }
+        }
+        _ => {
+            rival_merit = best.take();
+            best = Some((fit, merit));
+        }
+    };
+    for minimum in minima.iter().flatten() {
+        match problem.fit(observations, cost, &minimum.rotation) {
+            Ok(fit) => {
+                iterations = iterations.saturating_add(fit.iterations);
+                consider(fit, merit(problem, &fit, minimum.cost));
+                if let Some(rival) = ambiguity::rival(problem, observations, cost, &fit.pose) {
+                    let rival_cost = cost.value(&rival.pose.rotation);
+                    consider(rival, merit(problem, &rival, rival_cost));
+                }
+            }
+            Err(error) => failure = error,
+        }
+    }
+    let (fit, _) = best.ok_or(failure)?;
+    Ok(Candidate {
+        fit,
+        rival_chi_squared: rival_merit.map(|(rival, _)| rival.chi_squared),
+        iterations,
+        initialisation: Initialisation::Global,
+    })
+}
+
+/// What "best" means: each refinement minimises its own error.
+fn merit(problem: &Problem, fit: &Fit, collinearity: f64) -> f64 {
+    match problem.refinement {
+        Refinement::MaximumLikelihood => fit.chi_squared,
+        Refinement::None => collinearity,
+    }
+}

@@ -1,0 +1,159 @@
+//! No prior: descend from the rotations of the icosahedron, keep every minimum in front of the camera.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
+
+use crate::estimation::collinearity::CollinearityCost;
+use crate::estimation::newton::{self, Minimum};
+
+/// Rotations of the icosahedral group; none is farther than 44.5° from the nearest of them.
+const GROUP_SIZE: usize = 60;
+/// Descents; the right basin was among the best eight in every one of thousands of random frames.
+const DESCENTS: usize = 8;
+/// Different minima kept.
+pub(crate) const MAX_MINIMA: usize = 4;
+/// Chord (about rad) under which two descents ended in the same minimum.
+const SAME_MINIMUM: f64 = 0.02;
+
+static ICOSAHEDRAL_GROUP: LazyLock<[Rotation3<f64>; GROUP_SIZE]> = LazyLock::new(icosahedral_group);
+
+/// Returns the minima of the cost with the markers' mean in front of the camera, best first.
+///
+/// The search ranks the sixty rotations of the icosahedral group by cost and descends from the best.
+pub(crate) fn front_minima(
+    cost: &CollinearityCost,
+    step_tolerance: f64,
+) -> ([Option<Minimum>; MAX_MINIMA], u16) {
+    // The best few starts, by insertion: no allocation, and sixty entries need no better sort.
+    let mut starts = [(f64::INFINITY, 0_usize); DESCENTS];
+    for (index, rotation) in ICOSAHEDRAL_GROUP.iter().enumerate() {
+        // A start behind the camera still descends to the front now and then, but rarely.
+        if cost.centre_in_camera(rotation).z > 0.0 {
+            insert(&mut starts, (cost.value(rotation), index), |a, b| a.0 < b.0);
+        }
+    }
+    let mut minima = [None; MAX_MINIMA];
+    let mut iterations = 0_u16;
+    for (value, index) in starts {
+        if value.is_infinite() {
+            break;
+        }
+        let minimum = newton::minimise(cost, &ICOSAHEDRAL_GROUP[index], step_tolerance);
+        iterations = iterations.saturating_add(minimum.iterations);
+        let in_front = cost.centre_in_camera(&minimum.rotation).z > 0.0;
+        let known = minima.iter().flatten().any(|other: &Minimum| {
+            (other.rotation.matrix() - minimum.rotation.matrix()).norm() < SAME_MINIMUM
+        });
+        if minimum.converged && in_front && !known {
+            insert(&mut minima, Some(minimum), |a, b| match (a, b) {
+                (Some(a), Some(b)) => a.cost < b.cost,
+                (Some(_), None) => true,
+                (None, _) => false,
+            });
+        }
+    }
+    (minima, iterations)
+}
+
+/// Puts `item` at its place in a sorted array and lets the last one drop off.
+fn insert<T: Copy, const N: usize>(sorted: &mut [T; N], item: T, before: impl Fn(&T, &T) -> bool) {
+    if let Some(place) = sorted.iter().position(|other| before(&item, other)) {
+        sorted[place..].rotate_right(1);
+        sorted[place] = item;
+    }
+}
+
+/// The 60 rotations of the icosahedron, as the unit icosians up to sign.
+fn icosahedral_group() -> [Rotation3<f64>; GROUP_SIZE] {
+    let golden = f64::midpoint(1.0, 5.0_f64.sqrt());
+    let mut quaternions: Vec<[f64; 4]> = Vec::with_capacity(2 * GROUP_SIZE);
+    for axis in 0..4 {
+        for sign in [-1.0, 1.0] {
+            let mut q = [0.0; 4];
+            q[axis] = sign;
+            quaternions.push(q);
+        }
+    }
+    let signs = |bits: usize, k: usize| if bits >> k & 1 == 0 { 0.5 } else { -0.5 };
+    for bits in 0..16 {
+        quaternions.push(std::array::from_fn(|k| signs(bits, k)));
+    }
+    let base = [golden, 1.0, 1.0 / golden, 0.0];
+    for permutation in even_permutations() {
+        for bits in 0..8 {
+            let signed: [f64; 4] =
+                std::array::from_fn(|k| if k < 3 { base[k] * signs(bits, k) } else { 0.0 });
+            quaternions.push(std::array::from_fn(|k| signed[permutation[k]]));
+        }
+    }
+    let mut group = [Rotation3::identity(); GROUP_SIZE];
+    let mut filled = 0;
+    for q in quaternions {
+        let first = q.iter().copied().find(|value| *value != 0.0).unwrap_or(0.0);
+        if first > 0.0 && filled < GROUP_SIZE {
+            group[filled] =
+                UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
+                    .to_rotation_matrix();
+            filled += 1;
+        }
+    }
+    group
+}
+
+fn even_permutations() -> Vec<[usize; 4]> {
+    let mut even = Vec::with_capacity(12);
+    for code in 0..256_usize {
+        let p = [code >> 6 & 3, code >> 4 & 3, code >> 2 & 3, code & 3];
+        let inversions = (0..4)
+            .flat_map(|i| (i + 1..4).map(move |j| (i, j)))
+            .filter(|&(i, j)| p[i] > p[j])
+            .count();
+        let is_permutation = (0..4).all(|value| p.contains(&value));
+        if is_permutation && inversions % 2 == 0 {
+            even.push(p);
+        }
+    }
+    even
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_sixty_rotations_form_a_group() {
+        for a in ICOSAHEDRAL_GROUP.iter() {
+            for b in ICOSAHEDRAL_GROUP.iter() {
+                let product = a * b;
+                let members = ICOSAHEDRAL_GROUP
+                    .iter()
+                    .filter(|c| (c.matrix() - product.matrix()).norm() < 1e-12)
+                    .count();
+                assert_eq!(
+                    members, 1,
+                    "each product is one member, and members are distinct"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_rotation_is_farther_than_the_covering_radius() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..2000 {
+            let q = Quaternion::from(nalgebra::Vector4::from_fn(|_, _| {
+                rng.random_range(-1.0..1.0_f64)
+            }));
+            let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
+            let nearest = ICOSAHEDRAL_GROUP
+                .iter()
+                .map(|member| member.angle_to(&rotation).to_degrees())
+                .fold(f64::INFINITY, f64::min);
+            assert!(nearest < 44.5, "nearest {nearest}°");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The one home of what a pose error is and in which order its covariance stands.
+
+use nalgebra::{Isometry3, Matrix6, Rotation3, Vector6};
+
+use super::rotation::skew;
+
+/// Covariance of a pose `b_from_a`, in ROS's convention (`geometry_msgs/PoseWithCovariance`).
+///
+/// Order (x, y, z, rotX, rotY, rotZ), in m and rad, along and about the fixed axes of frame `b`,
+/// the message's `header.frame_id`. The error it describes stands on the left and keeps position and
+/// attitude apart: `t = t̂ + δt`, `R = Exp(δθ) R̂`, see [`pose_error`]. It is therefore not the
+/// covariance of an se(3) twist, and turning it into other axes is `blockdiag(Q, Q) Σ blockdiag(Q, Q)ᵀ`,
+/// which is what tf2 and MAVROS do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseCovariance(pub Matrix6<f64>);
+
+impl PoseCovariance {
+    /// Returns the 36 numbers row by row, as ROS messages carry them.
+    #[must_use]
+    pub fn row_major(&self) -> [f64; 36] {
+        std::array::from_fn(|i| self.0[(i / 6, i % 6)])
+    }
+
+    /// Returns the covariance of the same pose error with its vectors expressed in axes turned by `rotation`.
+    #[must_use]
+    pub fn rotated(&self, rotation: &Rotation3<f64>) -> Self {
+        let mut q = Matrix6::zeros();
+        q.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
+        q.fixed_view_mut::<3, 3>(3, 3).copy_from(rotation.matrix());
+        Self(q * self.0 * q.transpose())
+    }
+
+    /// Returns `eᵀ Σ⁻¹ e`, the squared Mahalanobis distance of a pose error (NEES when the error is
+    /// against the truth); none when the covariance is not positive definite.
+    #[must_use]
+    pub fn mahalanobis_squared(&self, error: &Vector6<f64>) -> Option<f64> {
+        self.0
+            .cholesky()
+            .map(|factor| error.dot(&factor.solve(error)))
+    }
+
+    /// Returns whether the matrix is finite, symmetric and positive definite.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.0.iter().all(|value| value.is_finite())
+            && self.0 == self.0.transpose()
+            && self.0.cholesky().is_some()
+    }
+
+    /// Returns the covariance of `(δt, δθ)` from that of `(δθ, δc)`, where `c = t + lever` is the
+    /// position in frame `b` of a point that turns with `a`, and `lever` leads from `a`'s origin to it.
+    pub(crate) fn from_point(
+        rotation_then_point: &Matrix6<f64>,
+        lever: &nalgebra::Vector3<f64>,
+    ) -> Self {
+        // t = c − R l, and δ(R l) = δθ × lever, so δt = δc + lever × δθ.
+        let mut j = Matrix6::zeros();
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(*lever));
+        j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+        j.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
+        let covariance = j * rotation_then_point * j.transpose();
+        Self((covariance + covariance.transpose()) * 0.5)
+    }
+}
+
+/// Returns the error of `found` against `truth` in the coordinates of [`PoseCovariance`]:
+/// `(t − t̂, Log(R R̂ᵀ))`, m and rad.
+#[must_use]
+pub fn pose_error(truth: &Isometry3<f64>, found: &Isometry3<f64>) -> Vector6<f64> {
+    let position = truth.translation.vector - found.translation.vector;
+    let rotation = (truth.rotation * found.rotation.inverse()).scaled_axis();
+    Vector6::new(
+        position.x, position.y, position.z, rotation.x, rotation.y, rotation.z,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    #[test]
+    fn pose_error_recovers_a_left_increment() {
+        let found = Isometry3::new(Vector3::new(1.0, 2.0, 15.0), Vector3::new(0.1, -0.4, 0.7));
+        let (dt, dtheta) = (
+            Vector3::new(0.01, -0.02, 0.03),
+            Vector3::new(1e-3, 2e-3, -3e-3),
+        );
+        let truth = Isometry3::from_parts(
+            Translation3::from(found.translation.vector + dt),
+            UnitQuaternion::from_scaled_axis(dtheta) * found.rotation,
+        );
+        let error = pose_error(&truth, &found);
+        let expected = Vector6::new(dt.x, dt.y, dt.z, dtheta.x, dtheta.y, dtheta.z);
+        assert!((error - expected).norm() < 1e-14);
+    }
+
+    #[test]
+    fn moving_the_reference_point_matches_finite_motion() {
+        let lever = Vector3::new(0.5, -1.0, 2.0);
+        // A pure rotation error about the point moves the origin by lever × δθ.
+        let mut about_point = Matrix6::zeros();
+        about_point[(2, 2)] = 1.0;
+        let covariance = PoseCovariance::from_point(&about_point, &lever).0;
+        let moved = lever.cross(&Vector3::z());
+        for i in 0..3 {
+            for j in 0..3 {
+                assert!((covariance[(i, j)] - moved[i] * moved[j]).abs() < 1e-15);
+            }
+        }
+        assert!((covariance[(5, 5)] - 1.0).abs() < 1e-15);
+        assert!((covariance[(0, 5)] - moved.x).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rotating_axes_keeps_the_mahalanobis_distance() {
+        let mut covariance = Matrix6::identity() * 0.5;
+        covariance[(0, 4)] = 0.1;
+        covariance[(4, 0)] = 0.1;
+        let covariance = PoseCovariance(covariance);
+        let turn = Rotation3::new(Vector3::new(0.3, 0.2, -0.5));
+        let error = Vector6::new(1.0, 2.0, 3.0, 0.1, 0.2, 0.3);
+        let mut turned = Vector6::zeros();
+        turned
+            .fixed_rows_mut::<3>(0)
+            .copy_from(&(turn * error.fixed_rows::<3>(0)));
+        turned
+            .fixed_rows_mut::<3>(3)
+            .copy_from(&(turn * error.fixed_rows::<3>(3)));
+        let before = covariance
+            .mahalanobis_squared(&error)
+            .expect("positive definite");
+        let after = covariance
+            .rotated(&turn)
+            .mahalanobis_squared(&turned)
+            .expect("positive definite");
+        assert!((before - after).abs() < 1e-10);
+    }
+}

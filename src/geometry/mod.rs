@@ -1,0 +1,14 @@
+//! Rotations, poses and covariances: the ground floor.
+//!
+//! Knows `nalgebra` only. A transform is `b_from_a`: it takes coordinates in `a` to coordinates in
+//! `b`, and neighbours cancel, `c_from_b * b_from_a`. What a pose error is, and in which order its
+//! covariance stands, is told once, in [`PoseCovariance`].
+
+mod covariance;
+mod rotation;
+
+pub use covariance::{PoseCovariance, pose_error};
+pub use rotation::{
+    axial, cayley, nearest_rotation, nearest_rotation_by_svd, optical_from_body,
+    rotation_from_roll_pitch_yaw, skew,
+};

@@ -1,0 +1,136 @@
+//! Checks of what came, before anything is computed from it.
+
+use nalgebra::Point3;
+
+use super::{Detection, Refusal, Stamp};
+use crate::camera::{Camera, Pixel};
+use crate::estimation::Observation;
+
+/// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
+pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
+/// px; beyond this a detection says nothing.
+pub(super) const MAX_SIGMA_PX: f64 = 1e3;
+/// px; limit of pixels where the size of the image is not known.
+const MAX_PIXEL: f64 = 1e5;
+
+pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
+    let is_zero = stamp.sec == 0 && stamp.nanosec == 0;
+    if is_zero || stamp.sec < 0 || stamp.nanosec >= 1_000_000_000 {
+        return Err(Refusal::InvalidStamp(stamp));
+    }
+    Ok(())
+}
+
+pub(super) fn check_frame_id(expected: &str, got: &str) -> Result<(), Refusal> {
+    if got.is_empty() || expected != got {
+        return Err(Refusal::FrameMismatch {
+            expected: expected.to_owned(),
+            got: got.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// Returns the detections as observations, in their order.
+///
+/// # Inputs
+/// * `default_sigma_px`: for detections with sigma 0.
+/// * `marker_in_tanker`: where a marker sits, m; none for an id that is not on the tanker.
+///
+/// # Errors
+/// [`Refusal`] on the first fault: pixel not finite, sigma out of range, id unknown, id twice, pixel
+/// far outside the image. One bad detection refuses the frame, because a detector that makes one
+/// such mistake is not to be believed on the others.
+pub fn observe(
+    camera: &Camera,
+    detections: &[Detection],
+    default_sigma_px: f64,
+    marker_in_tanker: impl Fn(u32) -> Option<Point3<f64>>,
+) -> Result<Vec<Observation>, Refusal> {
+    let observations = detections
+        .iter()
+        .map(|seen| {
+            check_numbers(seen)?;
+            let marker_in_tanker = marker_in_tanker(seen.id)
+                .ok_or_else(|| unknown_ids(detections, &marker_in_tanker))?;
+            check_in_image(camera, seen)?;
+            Ok(Observation {
+                id: seen.id,
+                marker_in_tanker,
+                pixel: Pixel {
+                    u: seen.u_px,
+                    v: seen.v_px,
+                },
+                sigma_px: if seen.sigma_px == 0.0 {
+                    default_sigma_px
+                } else {
+                    seen.sigma_px
+                },
+            })
+        })
+        .collect::<Result<Vec<_>, Refusal>>()?;
+    check_unique(detections)?;
+    Ok(observations)
+}
+
+fn check_numbers(seen: &Detection) -> Result<(), Refusal> {
+    let Detection {
+        id,
+        u_px,
+        v_px,
+        sigma_px,
+    } = *seen;
+    if !(u_px.is_finite() && v_px.is_finite()) {
+        return Err(Refusal::NotFinite { id, u_px, v_px });
+    }
+    if sigma_px != 0.0 && !(MIN_SIGMA_PX..=MAX_SIGMA_PX).contains(&sigma_px) {
+        return Err(Refusal::InvalidSigma { id, sigma_px });
+    }
+    Ok(())
+}
+
+/// A centroid may lie a little outside the image, but not farther than the image is wide: such a
+/// pixel is garbage, or belongs to a `camera_info` of another resolution.
+fn check_in_image(camera: &Camera, seen: &Detection) -> Result<(), Refusal> {
+    let size = camera.image_size_px();
+    let within = |value: f64, length: Option<u32>| {
+        let length = length.map_or(MAX_PIXEL, f64::from);
+        (-length..=2.0 * length).contains(&value)
+    };
+    if within(seen.u_px, size.map(|s| s.0)) && within(seen.v_px, size.map(|s| s.1)) {
+        return Ok(());
+    }
+    let image = size.map_or("image".to_owned(), |(width, height)| {
+        format!("{width} × {height} image")
+    });
+    Err(Refusal::OutsideImage {
+        id: seen.id,
+        reason: format!(
+            "expected a pixel in or near the {image}, got ({}, {})",
+            seen.u_px, seen.v_px
+        ),
+    })
+}
+
+fn check_unique(detections: &[Detection]) -> Result<(), Refusal> {
+    let mut ids: Vec<u32> = detections.iter().map(|seen| seen.id).collect();
+    ids.sort_unstable();
+    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(&[id, _]) => Err(Refusal::DuplicateId {
+            id,
+            count: ids.iter().filter(|&&other| other == id).count(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn unknown_ids(detections: &[Detection], known: impl Fn(u32) -> Option<Point3<f64>>) -> Refusal {
+    let mut ids: Vec<u32> = detections
+        .iter()
+        .map(|seen| seen.id)
+        .filter(|&id| known(id).is_none())
+        .collect();
+    ids.sort_unstable();
+    ids.dedup();
+    Refusal::UnknownId { ids }
+}

@@ -1,0 +1,225 @@
+//! What becomes of a frame: a trusted pose, or the one reason for none.
+
+use crate::camera::CameraError;
+use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
+
+use super::Stamp;
+
+/// Why a frame gives no pose. Each says what was expected and what came.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// No camera info yet.
+    #[error("expected a camera_info before the first detections, none has arrived yet")]
+    NoCameraInfo,
+    /// The latest camera info cannot be used.
+    #[error("the latest camera_info cannot be used: {0}")]
+    InvalidCameraInfo(CameraError),
+    /// The detections belong to another camera frame, or do not say to which.
+    #[error("expected detections in the frame of camera_info, '{expected}', got frame_id '{got}'{}", if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
+    FrameMismatch {
+        /// `frame_id` of the camera info.
+        expected: String,
+        /// `frame_id` of the detections.
+        got: String,
+    },
+    /// The time of the image is missing or malformed.
+    #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
+    InvalidStamp(Stamp),
+    /// An id that is not on the tanker.
+    #[error("expected ids of the marker map, got unknown id {}", join(ids))]
+    UnknownId {
+        /// All such ids of the frame.
+        ids: Vec<u32>,
+    },
+    /// One marker seen twice.
+    #[error("expected each id once, got id {id} {count} times")]
+    DuplicateId {
+        /// The first such id.
+        id: u32,
+        /// How often.
+        count: usize,
+    },
+    /// A pixel that is not a number.
+    #[error("expected finite pixels, got ({u_px}, {v_px}) for id {id}")]
+    NotFinite {
+        /// Marker id.
+        id: u32,
+        /// Column.
+        u_px: f64,
+        /// Row.
+        v_px: f64,
+    },
+    /// A sigma that cannot be one.
+    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px} for id {id}", least = super::checks::MIN_SIGMA_PX, most = super::checks::MAX_SIGMA_PX)]
+    InvalidSigma {
+        /// Marker id.
+        id: u32,
+        /// The sigma, px.
+        sigma_px: f64,
+    },
+    /// A pixel where the image or the lens model does not reach.
+    #[error("id {id}: {reason}")]
+    OutsideImage {
+        /// Marker id.
+        id: u32,
+        /// What was expected and what came.
+        reason: String,
+    },
+    /// Fewer points than a pose needs.
+    #[error("expected at least {need} points, got {got}")]
+    TooFewPoints {
+        /// Points at hand.
+        got: usize,
+        /// Points needed.
+        need: usize,
+    },
+    /// The points cannot fix a pose.
+    #[error("expected points that fix a pose, but {reason}")]
+    DegenerateGeometry {
+        /// What is wrong with them.
+        reason: &'static str,
+    },
+    /// The solver found no minimum.
+    #[error("expected the solver to settle, but it did not within {iterations} iterations")]
+    NoConvergence {
+        /// Iterations of the stage that gave up.
+        iterations: u16,
+    },
+    /// The best fit is a mirror image.
+    #[error(
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.3} m: ids exchanged, or a wrong detection?"
+    )]
+    BehindCamera {
+        /// Marker id.
+        id: u32,
+        /// Depth, m.
+        depth_m: f64,
+    },
+    /// The residuals are larger than the sigmas promise.
+    #[error(
+        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {rms_px:.2} px): a wrong detection or id, or a sigma too small?"
+    )]
+    NotTrusted {
+        /// Of the best fit.
+        chi_squared: f64,
+        /// The largest to trust.
+        limit: f64,
+        /// Of the test.
+        degrees_of_freedom: u16,
+        /// Of the best fit, px.
+        rms_px: f64,
+    },
+    /// A second pose fits nearly as well.
+    #[error(
+        "expected one pose to stand out, but another is {ambiguity:.3} times as likely (max_ambiguity {limit})"
+    )]
+    Ambiguous {
+        /// Likelihood of the rival over that of the best.
+        ambiguity: f64,
+        /// The largest to accept.
+        limit: f64,
+    },
+}
+
+impl From<EstimateError> for Refusal {
+    fn from(error: EstimateError) -> Self {
+        match error {
+            EstimateError::TooFewPoints { got, need } => Self::TooFewPoints { got, need },
+            EstimateError::NoRay { id, cause } => Self::OutsideImage {
+                id,
+                reason: cause.to_string(),
+            },
+            EstimateError::Degenerate { reason } => Self::DegenerateGeometry { reason },
+            EstimateError::NoConvergence { iterations } => Self::NoConvergence { iterations },
+            EstimateError::BehindCamera { id, depth_m } => Self::BehindCamera { id, depth_m },
+        }
+    }
+}
+
+/// What became of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameOutcome {
+    /// The trusted pose, or the one reason for none.
+    pub result: Result<Solution, Refusal>,
+    /// The solution behind a refusal that was judged on its numbers: for the status, never to be flown.
+    pub doubtful: Option<Solution>,
+    /// Marker ids that the solution rests on.
+    pub used_ids: Vec<u32>,
+    /// Marker ids left out as wrong.
+    pub rejected_ids: Vec<u32>,
+    /// Where the iteration started; none when no solve was attempted.
+    pub initialisation: Option<Initialisation>,
+}
+
+impl FrameOutcome {
+    /// Returns the outcome of a frame that gave no solution.
+    #[must_use]
+    pub fn refused(refusal: Refusal) -> Self {
+        Self {
+            result: Err(refusal),
+            doubtful: None,
+            used_ids: Vec::new(),
+            rejected_ids: Vec::new(),
+            initialisation: None,
+        }
+    }
+
+    pub(super) fn judged(
+        solution: Solution,
+        observations: &[Observation],
+        settings: &EstimatorSettings,
+    ) -> Self {
+        let (rejected_ids, used_ids) = observations
+            .iter()
+            .map(|o| o.id)
+            .partition(|&id| solution.excluded.contains(id));
+        let initialisation = Some(solution.initialisation);
+        let (result, doubtful) = match doubt(&solution, settings) {
+            Some(refusal) => (Err(refusal), Some(solution)),
+            None => (Ok(solution), None),
+        };
+        Self {
+            result,
+            doubtful,
+            used_ids,
+            rejected_ids,
+            initialisation,
+        }
+    }
+
+    /// Returns the numbers of the best fit, trusted or not.
+    #[must_use]
+    pub fn solution(&self) -> Option<&Solution> {
+        self.result.as_ref().ok().or(self.doubtful.as_ref())
+    }
+}
+
+fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
+    if !solution.is_trusted() {
+        return Some(Refusal::NotTrusted {
+            chi_squared: solution.chi_squared,
+            limit: solution.chi_squared_limit,
+            degrees_of_freedom: solution.degrees_of_freedom,
+            rms_px: solution.rms_px,
+        });
+    }
+    if !solution.covariance.is_valid() {
+        return Some(Refusal::DegenerateGeometry {
+            reason: "from this view they leave a direction of the pose free",
+        });
+    }
+    (solution.ambiguity >= settings.max_ambiguity && settings.max_ambiguity < 1.0).then_some(
+        Refusal::Ambiguous {
+            ambiguity: solution.ambiguity,
+            limit: settings.max_ambiguity,
+        },
+    )
+}
+
+fn join(ids: &[u32]) -> String {
+    ids.iter()
+        .map(u32::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
+}

@@ -1,0 +1,62 @@
+//! Why a marker map cannot be used.
+
+use crate::yaml::{Place, YamlError};
+
+/// Why a marker map cannot be used; each message begins with the place at fault.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "a variant's message names its fields")]
+pub enum MarkerMapError {
+    /// No YAML, or not in a marker map's shape.
+    #[error(transparent)]
+    Yaml(#[from] YamlError),
+    /// An id that detections cannot carry.
+    #[error("{place}: marker id must be 0 to {max}, got {id}", max = u32::MAX)]
+    IdOutOfRange { place: Place, id: i64 },
+    /// One id for two markers.
+    #[error("{place}: marker id {id} is already taken at {first}")]
+    DuplicateId { place: Place, id: u32, first: Place },
+    /// Fewer markers than any pose needs.
+    #[error("{place}: need at least {need} markers for a pose, got {got}")]
+    TooFewMarkers {
+        place: Place,
+        got: usize,
+        need: usize,
+    },
+    /// A coordinate that is NaN or infinite.
+    #[error("{place}: {axis} of marker {id} must be a finite number of metres, got {value}")]
+    NotFinite {
+        place: Place,
+        id: u32,
+        axis: char,
+        value: f64,
+    },
+    /// A coordinate that no aircraft reaches: a wrong unit or a slipped digit.
+    #[error(
+        "{place}: {axis} of marker {id} must be within {limit_m} m of the origin, got {value_m} m"
+    )]
+    TooFar {
+        place: Place,
+        id: u32,
+        axis: char,
+        value_m: f64,
+        limit_m: f64,
+    },
+    /// Two markers at one place.
+    #[error(
+        "{place}: marker {id} is {distance_m} m from marker {other} at {other_place}, must be at least {need_m} m"
+    )]
+    SamePlace {
+        place: Place,
+        id: u32,
+        other: u32,
+        other_place: Place,
+        distance_m: f64,
+        need_m: f64,
+    },
+    /// All markers on one line: the rotation about it can't be seen.
+    #[error(
+        "{place}: all markers lie on one line (spread across it is {ratio:.1e} of that along it, need {need:.0e})"
+    )]
+    OnOneLine { place: Place, ratio: f64, need: f64 },
+}

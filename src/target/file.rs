@@ -1,0 +1,198 @@
+//! A marker map's YAML -> a checked map, with every error at its line.
+
+use nalgebra::Point3;
+use serde::Deserialize;
+use serde_saphyr::Spanned;
+
+use super::check::{Part, check};
+use super::{Marker, MarkerMap, MarkerMapError};
+use crate::yaml::{self, Place};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMap {
+    name: String,
+    markers: Spanned<Vec<RawMarker>>,
+}
+
+/// `id` is wider than ids are, so that one out of range is told as such.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawMarker {
+    id: Spanned<i64>,
+    x: Spanned<f64>,
+    y: Spanned<f64>,
+    z: Spanned<f64>,
+}
+
+pub(super) fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
+    let raw: RawMap = yaml::read(text, source)?;
+    let entries = &raw.markers.value;
+    let markers = entries
+        .iter()
+        .map(|entry| {
+            let id = u32::try_from(entry.id.value).map_err(|_| MarkerMapError::IdOutOfRange {
+                place: Place::at(source, entry.id.referenced),
+                id: entry.id.value,
+            })?;
+            Ok(Marker {
+                id,
+                marker_in_tanker: Point3::new(entry.x.value, entry.y.value, entry.z.value),
+            })
+        })
+        .collect::<Result<Vec<_>, MarkerMapError>>()?;
+    check(&markers, |part| {
+        let location = match part {
+            Part::Markers => raw.markers.referenced,
+            Part::Id(index) => entries[index].id.referenced,
+            Part::Coordinate(index, 0) => entries[index].x.referenced,
+            Part::Coordinate(index, 1) => entries[index].y.referenced,
+            Part::Coordinate(index, _) => entries[index].z.referenced,
+        };
+        Place::at(source, location)
+    })?;
+    Ok(MarkerMap::sorted(&raw.name, markers))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three good markers on lines 3 to 5; what is appended begins on line 6.
+    const GOOD: &str = "name: kite
+markers:
+  - {id: 1, x: 0, y: -1.5, z: 0}
+  - {id: 2, x: 0, y: 1.5, z: 0}
+  - {id: 3, x: 3, y: 0, z: 0.25}
+";
+
+    fn refusal_of_sixth_line(line: &str) -> String {
+        refusal(&format!("{GOOD}{line}\n")).to_string()
+    }
+
+    fn refusal(text: &str) -> MarkerMapError {
+        read(text, "m.yaml").expect_err("this map is wrong")
+    }
+
+    #[test]
+    fn good_text_gives_its_markers() {
+        let map = read(GOOD, "m.yaml").expect("a good map");
+        assert_eq!(map.name(), "kite");
+        assert_eq!(map.get(1), Some(Point3::new(0.0, -1.5, 0.0)));
+        assert_eq!(map.get(3), Some(Point3::new(3.0, 0.0, 0.25)));
+    }
+
+    #[test]
+    fn a_repeated_id_is_refused_with_both_lines() {
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 2, x: 1, y: 1, z: 1}"),
+            "m.yaml:6:10: marker id 2 is already taken at m.yaml:4:10"
+        );
+    }
+
+    #[test]
+    fn ids_that_detections_cannot_carry_are_refused_at_their_line() {
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: -1, x: 1, y: 1, z: 1}"),
+            "m.yaml:6:10: marker id must be 0 to 4294967295, got -1"
+        );
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 4294967296, x: 1, y: 1, z: 1}"),
+            "m.yaml:6:10: marker id must be 0 to 4294967295, got 4294967296"
+        );
+        for id in ["1.5", "one", "99999999999999999999", ""] {
+            let error = refusal_of_sixth_line(&format!("  - {{id: {id}, x: 1, y: 1, z: 1}}"));
+            assert!(error.starts_with("m.yaml:6:"), "{error}");
+        }
+    }
+
+    #[test]
+    fn coordinates_that_are_no_finite_number_are_refused_at_their_line() {
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 4, x: 1, y: .nan, z: 1}"),
+            "m.yaml:6:22: y of marker 4 must be a finite number of metres, got NaN"
+        );
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 4, x: 1, y: 1, z: -.inf}"),
+            "m.yaml:6:28: z of marker 4 must be a finite number of metres, got -inf"
+        );
+        for x in ["", "~", "null", "1,5", "1m", "true", "1e999", "[1]"] {
+            let error = refusal_of_sixth_line(&format!("  - {{id: 4, x: {x}, y: 1, z: 1}}"));
+            assert!(error.starts_with("m.yaml:6:"), "{x}: {error}");
+        }
+    }
+
+    #[test]
+    fn coordinates_no_aircraft_reaches_are_refused_at_their_line() {
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 4, x: 10000.5, y: 1, z: 1}"),
+            "m.yaml:6:16: x of marker 4 must be within 10000 m of the origin, got 10000.5 m"
+        );
+        let at_the_limit = format!(
+            "{GOOD}  - {{id: 4, x: -1.0e4, y: 1, z: 1}}\n  - {{id: 5, x: 1, y: 1.0e4, z: 1}}\n"
+        );
+        assert!(read(&at_the_limit, "m.yaml").is_ok());
+    }
+
+    #[test]
+    fn two_markers_at_one_place_are_refused_with_both_lines() {
+        assert_eq!(
+            refusal_of_sixth_line("  - {id: 4, x: 3, y: 0, z: 0.25}"),
+            "m.yaml:6:10: marker 4 is 0 m from marker 3 at m.yaml:5:10, must be at least 0.001 m"
+        );
+    }
+
+    #[test]
+    fn fewer_than_three_markers_are_refused() {
+        let two =
+            "name: few\nmarkers:\n  - {id: 1, x: 0, y: 0, z: 0}\n  - {id: 2, x: 1, y: 0, z: 0}\n";
+        assert_eq!(
+            refusal(two).to_string(),
+            "m.yaml:3:3: need at least 3 markers for a pose, got 2"
+        );
+        assert_eq!(
+            refusal("name: none\nmarkers: []\n").to_string(),
+            "m.yaml:2:10: need at least 3 markers for a pose, got 0"
+        );
+    }
+
+    #[test]
+    fn markers_on_one_line_are_refused() {
+        let text = "name: stick\nmarkers:\n  - {id: 1, x: 0, y: 0, z: 0}\n  - {id: 2, x: 1, y: 1, z: 1}\n  - {id: 3, x: 3, y: 3, z: 3}\n";
+        let error = refusal(text);
+        assert!(matches!(error, MarkerMapError::OnOneLine { .. }), "{error}");
+        assert!(
+            error
+                .to_string()
+                .starts_with("m.yaml:3:3: all markers lie on one line"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn another_shape_is_refused_at_its_line() {
+        let slips = [
+            ("name: kite\nmarkers:\n  - {id: 1, x: 0, y: 0}\n", 3),
+            (
+                "name: kite\nmarkers:\n  - {id: 1, x: 0, y: 0, z: 0, w: 1}\n",
+                3,
+            ),
+            (
+                "name: kite\nmarkers:\n  - {id: 1, x: 0, x: 1, y: 0, z: 0}\n",
+                3,
+            ),
+            ("name: kite\nmarkers: 3\n", 2),
+            ("name: kite\nmarkers:\n", 2),
+            ("name: kite\nbeacons: []\n", 2),
+            ("markers: []\n", 1),
+            ("name: kite\nmarkers:\n  - {id: 1, x: 0\n", 3),
+        ];
+        for (text, line) in slips {
+            let error = refusal(text);
+            assert!(
+                matches!(&error, MarkerMapError::Yaml(inner) if inner.place.line() == Some(line)),
+                "{text:?} gave {error:?}"
+            );
+        }
+    }
+}

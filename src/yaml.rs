@@ -1,0 +1,152 @@
+//! Configuration text -> plain values that still know where they stood.
+//!
+//! Knows YAML and nothing else: neither files (a caller brings text and the name of its source) nor
+//! what the values mean. Strict where a slip would go unseen: unknown and repeated keys, merge keys
+//! and unknown tags are errors; nothing is interpolated.
+
+use std::fmt;
+
+use serde::de::DeserializeOwned;
+use serde_saphyr::{DefaultMessageFormatter, Location, MessageFormatter as _, Options};
+use serde_saphyr::{DuplicateKeyPolicy, MergeKeyPolicy};
+
+/// A place that an error can point to: `config/tankers/paper.yaml:7:9`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// What holds the text, usually a path.
+    pub source: String,
+    /// Line and column, from 1; none where the fault has no place in a text.
+    pub line_column: Option<(u64, u64)>,
+}
+
+impl Place {
+    /// Returns the place of a source as a whole.
+    #[must_use]
+    pub fn whole(source: &str) -> Self {
+        Self {
+            source: source.to_owned(),
+            line_column: None,
+        }
+    }
+
+    /// Returns the place that the YAML reader gave to a value.
+    #[must_use]
+    pub fn at(source: &str, location: Location) -> Self {
+        let known = location != Location::UNKNOWN;
+        Self {
+            source: source.to_owned(),
+            line_column: known.then(|| (location.line(), location.column())),
+        }
+    }
+
+    /// Returns the line, from 1, where it is known.
+    #[must_use]
+    pub fn line(&self) -> Option<u64> {
+        self.line_column.map(|(line, _)| line)
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line_column {
+            Some((line, column)) => write!(f, "{}:{line}:{column}", self.source),
+            None => f.write_str(&self.source),
+        }
+    }
+}
+
+/// Text that is no YAML, or YAML of another shape than asked for.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {reason}")]
+pub struct YamlError {
+    /// Where the reader stopped.
+    pub place: Place,
+    /// What it expected and found.
+    pub reason: String,
+}
+
+/// Returns the value that a YAML text describes.
+///
+/// Fields of type [`serde_saphyr::Spanned`] keep their line and column. `T` should
+/// `deny_unknown_fields`.
+///
+/// # Errors
+/// [`YamlError`] with the place in `source`: syntax, a wrong type, a missing, unknown or repeated key.
+pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlError> {
+    serde_saphyr::from_str_with_options(text, strict()).map_err(|error| {
+        let message = DefaultMessageFormatter.format_message(&error).into_owned();
+        YamlError {
+            place: Place::at(source, error.location().unwrap_or(Location::UNKNOWN)),
+            reason: message.replace(char::is_control, " "),
+        }
+    })
+}
+
+/// Options under which nothing is accepted that a reader of the file would not expect.
+fn strict() -> Options {
+    serde_saphyr::options! {
+        duplicate_keys: DuplicateKeyPolicy::Error,
+        merge_keys: MergeKeyPolicy::Error,
+        reject_unsupported_tags: true,
+        with_snippet: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, PartialEq, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Sample {
+        a: f64,
+        b: u32,
+    }
+
+    fn refusal(text: &str) -> YamlError {
+        read::<Sample>(text, "s.yaml").expect_err("this text is wrong")
+    }
+
+    #[test]
+    fn good_text_gives_its_values() {
+        assert_eq!(
+            read::<Sample>("a: 1\nb: 2 # two\n", "s.yaml"),
+            Ok(Sample { a: 1.0, b: 2 })
+        );
+    }
+
+    #[test]
+    fn every_slip_is_told_with_its_line() {
+        let slips = [
+            ("a: 1\nb: 2\nc: 3\n", 3, "c"),
+            ("a: 1\nb: 2\na: 3\n", 3, "duplicate"),
+            ("a: 1\nb: -2\n", 2, ""),
+            ("a: 1\nb: 4294967296\n", 2, ""),
+            ("a: 1\nb: 2.5\n", 2, ""),
+            ("a: one\nb: 2\n", 1, ""),
+            ("a:\nb: 2\n", 1, ""),
+            ("a: ~\nb: 2\n", 1, ""),
+            ("a: 3.7m\nb: 2\n", 1, ""),
+            ("a: 1\n", 1, "b"),
+            ("a: 1\nb: {c: 2\n", 2, ""),
+            ("a: !metre 1\nb: 2\n", 1, ""),
+            ("a: 1\nb: 2\n---\na: 1\nb: 2\n", 4, "document"),
+        ];
+        for (text, line, word) in slips {
+            let error = refusal(text);
+            assert_eq!(error.place.line(), Some(line), "{text:?} gave {error}");
+            assert!(error.reason.contains(word), "{text:?} gave {error}");
+            assert!(
+                error.to_string().starts_with(&format!("s.yaml:{line}:")),
+                "{error}"
+            );
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn empty_text_is_an_error_and_never_a_default() {
+        assert!(read::<Sample>("", "s.yaml").is_err());
+        assert!(read::<Sample>("# nothing\n", "s.yaml").is_err());
+    }
+}
