@@ -22,6 +22,7 @@ pub mod config;
 pub mod estimation;
 pub mod geometry;
 pub mod pipeline;
+pub mod ros;
 pub mod simulation;
 pub mod target;
 pub mod yaml;

@@ -1,1 +1,45 @@
-fn main() {}
+//! The ROS 2 node: reads its command line and environment, and runs until a signal.
+
+use std::process::ExitCode;
+
+use tanker_pose::ros::arguments::{Command, HELP};
+use tanker_pose::ros::environment::Environment;
+use tanker_pose::ros::node;
+
+/// Exit code for a command line that cannot be understood.
+const USAGE: u8 = 2;
+
+fn main() -> ExitCode {
+    let arguments: Result<Vec<String>, _> = std::env::args_os()
+        .skip(1)
+        .map(std::ffi::OsString::into_string)
+        .collect();
+    let Ok(arguments) = arguments else {
+        return fail("an argument is not valid UTF-8", USAGE);
+    };
+    let arguments = match Command::parse(&arguments) {
+        Ok(Command::Run(arguments)) => arguments,
+        Ok(Command::Help) => {
+            print!("{HELP}");
+            return ExitCode::SUCCESS;
+        }
+        Ok(Command::Version) => {
+            println!("tanker_pose_node {}", env!("CARGO_PKG_VERSION"));
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return fail(&format!("{error} (see --help)"), USAGE),
+    };
+    let environment = match Environment::from_process() {
+        Ok(environment) => environment,
+        Err(error) => return fail(&error.to_string(), 1),
+    };
+    match node::run(&arguments, &environment) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => fail(&error.to_string(), 1),
+    }
+}
+
+fn fail(message: &str, code: u8) -> ExitCode {
+    eprintln!("tanker_pose_node: {message}");
+    ExitCode::from(code)
+}

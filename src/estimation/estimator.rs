@@ -4,6 +4,7 @@ use nalgebra::Rotation3;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::collinearity::CollinearityCost;
+use super::exclude;
 use super::initialise::{front_minima, linear_rotation};
 use super::problem::Problem;
 use super::refine::Fit;
@@ -13,6 +14,9 @@ use super::{
 };
 use crate::camera::{Camera, Ray};
 use crate::geometry::PoseCovariance;
+
+/// rad; a subset that has turned farther from its prior has found a way to fit noise, not the tanker.
+const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
 /// Settings with what can be computed once: the limits of the chi-squared test.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +50,9 @@ impl Estimator {
     /// Returns the pose that explains the observations best, with its covariance and the numbers to
     /// judge it by; whether to trust it is [`Solution::is_trusted`] and `ambiguity`.
     ///
+    /// When all points together cannot be trusted and `max_outliers` allows it, the pose is that of
+    /// the fewest exclusions that can; [`Solution::excluded`] names the points left out.
+    ///
     /// # Inputs
     /// * `observations`: each marker once, in any order, finite, sigmas above zero.
     /// * `previous`: the last trusted rotation of `camera_from_tanker`, used by
@@ -55,6 +62,26 @@ impl Estimator {
     /// Any [`EstimateError`]: too few points, points that fix no pose, a pixel without a ray, no
     /// minimum, a marker behind the camera.
     pub fn estimate(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        previous: Option<&Rotation3<f64>>,
+    ) -> Result<Solution, EstimateError> {
+        let solver = |points: &[Observation]| self.estimate_with_all(camera, points, previous);
+        let of_all = solver(observations);
+        let max_outliers = self.settings.max_outliers;
+        if max_outliers == 0 || of_all.as_ref().is_ok_and(Solution::is_trusted) {
+            return of_all;
+        }
+        let suspects = suspects(camera, observations, of_all.as_ref().ok());
+        let near_prior = |points: &[Observation]| {
+            solver(points).and_then(|solution| self.check_turn(solution, previous))
+        };
+        exclude::search(&near_prior, observations, &suspects, max_outliers).map_or(of_all, Ok)
+    }
+
+    /// Returns the pose of all these points, or the reason for none.
+    fn estimate_with_all(
         &self,
         camera: &Camera,
         observations: &[Observation],
@@ -91,6 +118,31 @@ impl Estimator {
                 let candidate = globally(&problem, observations, &cost)?;
                 Ok(self.judge(&problem, observations, &candidate))
             }
+        }
+    }
+
+    /// Lets a hypothesis about wrong points pass only near the prior that it started from.
+    fn check_turn(
+        &self,
+        solution: Solution,
+        previous: Option<&Rotation3<f64>>,
+    ) -> Result<Solution, EstimateError> {
+        let prior = match solution.initialisation {
+            Initialisation::Nominal => Some(&self.settings.nominal_camera_from_tanker),
+            Initialisation::Previous => previous,
+            Initialisation::Dlt | Initialisation::Global => None,
+        };
+        let found = solution.camera_from_tanker.rotation.to_rotation_matrix();
+        // The trace and not the angle, whose arc cosine is not a number for equal rotations.
+        let is_far = prior.is_some_and(|prior| {
+            (prior.matrix().dot(found.matrix()) - 1.0) * 0.5 < MAX_TURN_FROM_PRIOR.cos()
+        });
+        if is_far {
+            Err(EstimateError::NoConvergence {
+                iterations: solution.iterations,
+            })
+        } else {
+            Ok(solution)
         }
     }
 
@@ -138,6 +190,30 @@ impl Estimator {
             excluded: Excluded::default(),
         }
     }
+}
+
+/// Indices of the points that may be left out: all of a few, of many those that fit worst.
+fn suspects(
+    camera: &Camera,
+    observations: &[Observation],
+    of_all: Option<&Solution>,
+) -> Vec<usize> {
+    let mut suspects: Vec<(f64, usize)> = observations
+        .iter()
+        .enumerate()
+        .map(|(index, seen)| {
+            let residual = of_all.and_then(|solution| solution.residual_px(camera, seen));
+            (
+                residual.map_or(f64::INFINITY, |r| r.norm() / seen.sigma_px),
+                index,
+            )
+        })
+        .collect();
+    suspects.sort_by(|a, b| b.0.total_cmp(&a.0));
+    suspects.truncate(exclude::MAX_SUSPECTS);
+    let mut suspects: Vec<usize> = suspects.into_iter().map(|(_, index)| index).collect();
+    suspects.sort_unstable();
+    suspects
 }
 
 fn dlt_seed(

@@ -20,6 +20,7 @@ mod ambiguity;
 mod collinearity;
 mod covariance;
 mod estimator;
+mod exclude;
 mod initialise;
 mod newton;
 mod orthogonal_iteration;
@@ -27,9 +28,9 @@ mod problem;
 mod refine;
 mod trust;
 
-use nalgebra::{Isometry3, Point3, Rotation3};
+use nalgebra::{Isometry3, Point3, Rotation3, Vector2};
 
-use crate::camera::{Pixel, UndistortError};
+use crate::camera::{Camera, Pixel, Ray, UndistortError};
 use crate::geometry::PoseCovariance;
 
 pub use estimator::Estimator;
@@ -143,6 +144,20 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Returns predicted minus seen pixel, px; none where the marker has no pixel at this pose.
+    #[must_use]
+    pub fn residual_px(&self, camera: &Camera, seen: &Observation) -> Option<Vector2<f64>> {
+        let q = self.camera_from_tanker * seen.marker_in_tanker;
+        if q.z <= 0.0 {
+            return None;
+        }
+        let (pixel, _) = camera.project(Ray {
+            x: q.x / q.z,
+            y: q.y / q.z,
+        })?;
+        Some(Vector2::new(pixel.u - seen.pixel.u, pixel.v - seen.pixel.v))
+    }
+
     /// Returns whether the residuals are as small as the sigmas promise.
     #[must_use]
     pub fn is_trusted(&self) -> bool {

@@ -46,26 +46,32 @@ impl OutcomeCode {
         Self::Ambiguous,
     ];
 
-    /// Returns the constant's name in lower case, as tools print it.
+    /// Returns the number on the wire.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// Returns the constant's name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
-            Self::Ok => "ok",
-            Self::NoCameraInfo => "no_camera_info",
-            Self::InvalidCameraInfo => "invalid_camera_info",
-            Self::FrameMismatch => "frame_mismatch",
-            Self::ZeroStamp => "zero_stamp",
-            Self::UnknownId => "unknown_id",
-            Self::DuplicateId => "duplicate_id",
-            Self::NotFinite => "not_finite",
-            Self::InvalidSigma => "invalid_sigma",
-            Self::OutsideImage => "outside_image",
-            Self::TooFewPoints => "too_few_points",
-            Self::DegenerateGeometry => "degenerate_geometry",
-            Self::NoConvergence => "no_convergence",
-            Self::BehindCamera => "behind_camera",
-            Self::NotTrusted => "not_trusted",
-            Self::Ambiguous => "ambiguous",
+            Self::Ok => "OK",
+            Self::NoCameraInfo => "NO_CAMERA_INFO",
+            Self::InvalidCameraInfo => "INVALID_CAMERA_INFO",
+            Self::FrameMismatch => "FRAME_MISMATCH",
+            Self::ZeroStamp => "ZERO_STAMP",
+            Self::UnknownId => "UNKNOWN_ID",
+            Self::DuplicateId => "DUPLICATE_ID",
+            Self::NotFinite => "NOT_FINITE",
+            Self::InvalidSigma => "INVALID_SIGMA",
+            Self::OutsideImage => "OUTSIDE_IMAGE",
+            Self::TooFewPoints => "TOO_FEW_POINTS",
+            Self::DegenerateGeometry => "DEGENERATE_GEOMETRY",
+            Self::NoConvergence => "NO_CONVERGENCE",
+            Self::BehindCamera => "BEHIND_CAMERA",
+            Self::NotTrusted => "NOT_TRUSTED",
+            Self::Ambiguous => "AMBIGUOUS",
         }
     }
 }
@@ -120,13 +126,13 @@ mod tests {
                     .next()?
                     .strip_prefix("uint8 ")?
                     .split_once('=')?;
-                Some((name.trim().to_lowercase(), value.trim().parse().ok()?))
+                Some((name.trim().to_owned(), value.trim().parse().ok()?))
             })
-            .filter(|(name, _)| !name.starts_with("initialisation"))
+            .filter(|(name, _)| !name.starts_with("INITIALISATION"))
             .collect();
         let codes: Vec<(String, u8)> = OutcomeCode::ALL
             .iter()
-            .map(|&code| (code.name().to_owned(), code as u8))
+            .map(|&code| (code.name().to_owned(), code.number()))
             .collect();
         assert_eq!(constants, codes);
     }

@@ -111,7 +111,7 @@ struct InputPoint {
 #[derive(Debug, Serialize)]
 struct OutputFrame {
     id: serde_json::Value,
-    outcome: &'static str,
+    outcome: String,
     message: String,
     #[serde(flatten)]
     pose: Option<OutputPose>,
@@ -382,7 +382,7 @@ impl OutputFrame {
     fn malformed(id: serde_json::Value, message: String) -> Self {
         Self {
             id,
-            outcome: MALFORMED,
+            outcome: MALFORMED.to_owned(),
             message,
             pose: None,
             used_ids: Vec::new(),
@@ -394,7 +394,7 @@ impl OutputFrame {
     fn new(id: serde_json::Value, outcome: FrameOutcome) -> Self {
         Self {
             id,
-            outcome: outcome.code().name(),
+            outcome: outcome.code().name().to_ascii_lowercase(),
             message: outcome
                 .result
                 .as_ref()

@@ -1,0 +1,190 @@
+//! What the checked parameters mean together.
+
+use nalgebra::Rotation3;
+
+use super::{Parameters, Settings};
+use crate::estimation::{EstimatorSettings, Initialisation, Refinement};
+use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
+
+/// Everything that the parameters say, in the types that the node works with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Configuration {
+    /// What the processing of a frame depends on.
+    pub settings: Settings,
+    /// Name of a shipped marker map, or the path of one.
+    pub marker_map: String,
+    /// Child frame of the published transform.
+    pub tanker_frame_id: String,
+    /// Whether to publish to /tf.
+    pub publish_tf: bool,
+}
+
+impl From<&Parameters> for Configuration {
+    /// Returns the parameters' meaning; every checked set of values has one.
+    fn from(parameters: &Parameters) -> Self {
+        Self {
+            settings: Settings {
+                estimator: estimator_settings(parameters),
+                pixel_sigma_px: parameters.double("pixel_sigma_px"),
+                rectified: parameters.bool("rectified"),
+            },
+            marker_map: parameters.text("marker_map").to_owned(),
+            tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
+            publish_tf: parameters.bool("publish_tf"),
+        }
+    }
+}
+
+fn estimator_settings(parameters: &Parameters) -> EstimatorSettings {
+    EstimatorSettings {
+        initialisation: match parameters.text("initialisation") {
+            "dlt" => Initialisation::Dlt,
+            "previous" => Initialisation::Previous,
+            "global" => Initialisation::Global,
+            _ => Initialisation::Nominal,
+        },
+        refinement: match parameters.text("refinement") {
+            "none" => Refinement::None,
+            _ => Refinement::MaximumLikelihood,
+        },
+        nominal_camera_from_tanker: nominal_camera_from_tanker(parameters),
+        min_points: parameters.count("min_points"),
+        max_outliers: parameters.count("max_outliers"),
+        trust_probability: parameters.double("trust_probability"),
+        max_ambiguity: parameters.double("max_ambiguity"),
+    }
+}
+
+/// Returns the attitude that the tanker is expected to have in the camera.
+///
+/// `camera_from_tanker = optical_from_body · receiver_from_camera_bodyᵀ · receiver_from_tanker`:
+/// the angles turn bodies with x forward, y left, z up; the optical frame looks along that x.
+fn nominal_camera_from_tanker(parameters: &Parameters) -> Rotation3<f64> {
+    let turned = |prefix: &str| {
+        let angle = |axis: &str| {
+            parameters
+                .double(&format!("{prefix}_{axis}_deg"))
+                .to_radians()
+        };
+        // Rz(yaw) Ry(pitch) Rx(roll)
+        rotation_from_roll_pitch_yaw(angle("roll"), angle("pitch"), angle("yaw"))
+    };
+    let receiver_from_tanker = turned("nominal");
+    let receiver_from_camera_body = turned("camera_mount");
+    optical_from_body() * receiver_from_camera_body.inverse() * receiver_from_tanker
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ParameterValue::{Bool, Double, Integer, String};
+    use nalgebra::Vector3;
+
+    /// Rounding of a few products of sines, no unit.
+    const ROUNDING: f64 = 1e-15;
+
+    fn configuration(changes: &[(&str, crate::config::ParameterValue)]) -> Configuration {
+        let mut parameters = Parameters::default();
+        for (name, value) in changes {
+            parameters
+                .set(name, value.clone())
+                .expect("the test's values are valid");
+        }
+        Configuration::from(&parameters)
+    }
+
+    fn nominal(changes: &[(&str, f64)]) -> Rotation3<f64> {
+        let changes: Vec<_> = changes
+            .iter()
+            .map(|(name, deg)| (*name, Double(*deg)))
+            .collect();
+        configuration(&changes)
+            .settings
+            .estimator
+            .nominal_camera_from_tanker
+    }
+
+    fn assert_direction(found: Vector3<f64>, expected: [f64; 3]) {
+        assert!(
+            (found - Vector3::from(expected)).norm() < ROUNDING,
+            "{found:?} {expected:?}"
+        );
+    }
+
+    #[test]
+    fn aligned_tanker_flies_away_along_the_optical_axis() {
+        let camera_from_tanker = nominal(&[]);
+        assert_direction(camera_from_tanker * Vector3::x(), [0.0, 0.0, 1.0]);
+        assert_direction(camera_from_tanker * Vector3::y(), [-1.0, 0.0, 0.0]);
+        assert_direction(camera_from_tanker * Vector3::z(), [0.0, -1.0, 0.0]);
+    }
+
+    #[test]
+    fn tanker_yawed_left_points_left_in_the_image() {
+        let camera_from_tanker = nominal(&[("nominal_yaw_deg", 90.0)]);
+        assert_direction(camera_from_tanker * Vector3::x(), [-1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn camera_that_looks_up_sees_a_level_tanker_fly_downwards() {
+        // Positive pitch turns x towards minus z: a camera that looks up has a negative one.
+        let camera_from_tanker = nominal(&[("camera_mount_pitch_deg", -90.0)]);
+        assert_direction(camera_from_tanker * Vector3::x(), [0.0, 1.0, 0.0]);
+        assert_direction(camera_from_tanker * Vector3::z(), [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn camera_turned_with_the_tanker_sees_no_turn() {
+        let turned = nominal(&[
+            ("nominal_roll_deg", 10.0),
+            ("nominal_pitch_deg", -20.0),
+            ("nominal_yaw_deg", 30.0),
+            ("camera_mount_roll_deg", 10.0),
+            ("camera_mount_pitch_deg", -20.0),
+            ("camera_mount_yaw_deg", 30.0),
+        ]);
+        assert!(turned.rotation_to(&nominal(&[])).angle() < 1e-7); // acos near 1 loses half the digits
+    }
+
+    #[test]
+    fn every_parameter_reaches_its_setting() {
+        let found = configuration(&[
+            ("marker_map", String("fin6".into())),
+            ("tanker_frame_id", String("kc46".into())),
+            ("publish_tf", Bool(true)),
+            ("pixel_sigma_px", Double(0.25)),
+            ("rectified", Bool(true)),
+            ("initialisation", String("global".into())),
+            ("refinement", String("none".into())),
+            ("max_outliers", Integer(1)),
+            ("min_points", Integer(5)),
+            ("trust_probability", Double(0.95)),
+            ("max_ambiguity", Double(0.5)),
+        ]);
+        let estimator = &found.settings.estimator;
+        assert_eq!(
+            (found.marker_map.as_str(), found.tanker_frame_id.as_str()),
+            ("fin6", "kc46")
+        );
+        assert!(found.publish_tf && found.settings.rectified);
+        assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
+        assert_eq!(estimator.initialisation, Initialisation::Global);
+        assert_eq!(estimator.refinement, Refinement::None);
+        assert_eq!((estimator.max_outliers, estimator.min_points), (1, 5));
+        assert!((estimator.trust_probability - 0.95).abs() < f64::EPSILON);
+        assert!((estimator.max_ambiguity - 0.5).abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn every_word_of_initialisation_has_its_own_meaning() {
+        for (word, meaning) in [
+            ("nominal", Initialisation::Nominal),
+            ("dlt", Initialisation::Dlt),
+            ("previous", Initialisation::Previous),
+            ("global", Initialisation::Global),
+        ] {
+            let found = configuration(&[("initialisation", String(word.into()))]);
+            assert_eq!(found.settings.estimator.initialisation, meaning);
+        }
+    }
+}

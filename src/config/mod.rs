@@ -1,0 +1,29 @@
+//! Raw parameters -> checked settings.
+//!
+//! `table` is the one list of parameters with their defaults and ranges; `check` holds a value against
+//! it; `parameters` keeps checked values; `configuration` makes of them what the floors below work with. Knows `estimation`; never
+//! a file, a topic or where a value came from.
+
+mod check;
+mod configuration;
+mod parameters;
+mod table;
+mod value;
+
+pub use configuration::Configuration;
+pub use parameters::Parameters;
+pub use table::{Kind, ParameterSpec, TABLE};
+pub use value::{ParameterError, ParameterValue};
+
+use crate::estimation::EstimatorSettings;
+
+/// Everything a frame's processing depends on, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// How a pose is found and judged.
+    pub estimator: EstimatorSettings,
+    /// Standard deviation for detections that bring none, px.
+    pub pixel_sigma_px: f64,
+    /// Pixels are those of the rectified image: P instead of K and D.
+    pub rectified: bool,
+}

@@ -1,0 +1,224 @@
+//! The one list of parameters: names, types, defaults, ranges, descriptions.
+
+use super::ParameterValue;
+
+/// What a parameter may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// True or false.
+    Bool {
+        /// Value unless set.
+        default: bool,
+    },
+    /// A whole number within bounds.
+    Integer {
+        /// Value unless set.
+        default: i64,
+        /// Least value.
+        min: i64,
+        /// Greatest value.
+        max: i64,
+    },
+    /// A finite number within bounds; a whole number is taken as one.
+    Double {
+        /// Value unless set.
+        default: f64,
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// One of a few words.
+    Choice {
+        /// Value unless set.
+        default: &'static str,
+        /// All of the words.
+        allowed: &'static [&'static str],
+    },
+    /// Text that is not empty.
+    Text {
+        /// Value unless set.
+        default: &'static str,
+    },
+    /// The name of a tf2 frame.
+    FrameId {
+        /// Value unless set.
+        default: &'static str,
+    },
+}
+
+/// One parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpec {
+    /// Its name.
+    pub name: &'static str,
+    /// What it may be.
+    pub kind: Kind,
+    /// Whether it is fixed once the node runs.
+    pub read_only: bool,
+    /// What it does, with its unit, for people.
+    pub description: &'static str,
+}
+
+impl ParameterSpec {
+    /// Returns the spec of the parameter with this name.
+    #[must_use]
+    pub fn find(name: &str) -> Option<&'static Self> {
+        TABLE.iter().find(|spec| spec.name == name)
+    }
+
+    /// Returns the value that holds unless another is set.
+    #[must_use]
+    pub fn default(&self) -> ParameterValue {
+        match self.kind {
+            Kind::Bool { default } => ParameterValue::Bool(default),
+            Kind::Integer { default, .. } => ParameterValue::Integer(default),
+            Kind::Double { default, .. } => ParameterValue::Double(default),
+            Kind::Choice { default, .. } | Kind::Text { default } | Kind::FrameId { default } => {
+                ParameterValue::String(default.to_owned())
+            }
+        }
+    }
+}
+
+const fn angle(name: &'static str, description: &'static str) -> ParameterSpec {
+    let kind = Kind::Double {
+        default: 0.0,
+        min: -180.0,
+        max: 180.0,
+    };
+    ParameterSpec {
+        name,
+        kind,
+        read_only: false,
+        description,
+    }
+}
+
+/// All parameters. `config/tanker_pose.yaml` shows them to people; a test holds the two together.
+pub const TABLE: &[ParameterSpec] = &[
+    ParameterSpec {
+        name: "marker_map",
+        kind: Kind::Text { default: "paper" },
+        read_only: true,
+        description: "where the beacons sit on the tanker: a shipped map (paper, fin6) or the path of a YAML file",
+    },
+    ParameterSpec {
+        name: "tanker_frame_id",
+        kind: Kind::FrameId { default: "tanker" },
+        read_only: true,
+        description: "child frame of the pose in /tf; axes x forward, y left, z up",
+    },
+    ParameterSpec {
+        name: "publish_tf",
+        kind: Kind::Bool { default: false },
+        read_only: true,
+        description: "also publish trusted poses to /tf, parent: the camera's optical frame",
+    },
+    ParameterSpec {
+        name: "pixel_sigma_px",
+        kind: Kind::Double {
+            default: 0.5,
+            min: 0.001,
+            max: 100.0,
+        },
+        read_only: false,
+        description: "px, standard deviation of a detection's column and row where it brings no sigma of its own",
+    },
+    ParameterSpec {
+        name: "rectified",
+        kind: Kind::Bool { default: false },
+        read_only: false,
+        description: "the detections are pixels of the rectified image: use P of the camera info instead of K and D",
+    },
+    ParameterSpec {
+        name: "initialisation",
+        kind: Kind::Choice {
+            default: "nominal",
+            allowed: &["nominal", "dlt", "previous", "global"],
+        },
+        read_only: false,
+        description: "where the iteration starts: the nominal attitude (In_M2), a linear camera matrix (In_M1), \
+                      the last trusted pose, or a search over all attitudes",
+    },
+    angle(
+        "nominal_roll_deg",
+        "deg, expected roll of the tanker relative to the receiver",
+    ),
+    angle(
+        "nominal_pitch_deg",
+        "deg, expected pitch of the tanker relative to the receiver",
+    ),
+    angle(
+        "nominal_yaw_deg",
+        "deg, expected yaw of the tanker relative to the receiver",
+    ),
+    angle(
+        "camera_mount_roll_deg",
+        "deg, roll of the camera in the receiver; all zero: it looks along the receiver's x axis, upright",
+    ),
+    angle(
+        "camera_mount_pitch_deg",
+        "deg, pitch of the camera in the receiver; positive: it looks down",
+    ),
+    angle(
+        "camera_mount_yaw_deg",
+        "deg, yaw of the camera in the receiver; positive: it looks left",
+    ),
+    ParameterSpec {
+        name: "refinement",
+        kind: Kind::Choice {
+            default: "maximum_likelihood",
+            allowed: &["maximum_likelihood", "none"],
+        },
+        read_only: false,
+        description: "maximum_likelihood: least weighted pixel error; none: the orthogonal iteration's result as in the paper",
+    },
+    ParameterSpec {
+        name: "max_outliers",
+        kind: Kind::Integer {
+            default: 2,
+            min: 0,
+            max: 2,
+        },
+        read_only: false,
+        description: "how many detections may be excluded from a frame as wrong",
+    },
+    ParameterSpec {
+        name: "min_points",
+        kind: Kind::Integer {
+            default: 4,
+            min: 3,
+            max: 1000,
+        },
+        read_only: false,
+        description: "fewest detections to attempt a pose; 3 leave no redundancy to test the residuals",
+    },
+    ParameterSpec {
+        name: "trust_probability",
+        kind: Kind::Double {
+            default: 0.999,
+            min: 0.5,
+            max: 0.999_999,
+        },
+        read_only: false,
+        description: "probability with which a correct frame passes the chi-squared test of its residuals",
+    },
+    ParameterSpec {
+        name: "max_ambiguity",
+        kind: Kind::Double {
+            default: 1.0,
+            min: 0.0,
+            max: 1.0,
+        },
+        read_only: false,
+        description: "refuse a pose when the second-best one is at least this likely relative to it; 1: never refuse",
+    },
+    ParameterSpec {
+        name: "use_sim_time",
+        kind: Kind::Bool { default: false },
+        read_only: false,
+        description: "take the time of diagnostics and log messages from /clock: accepted, not done yet; \
+                      stamps of poses are those of the detections either way, never read from a clock",
+    },
+];

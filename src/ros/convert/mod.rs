@@ -1,0 +1,170 @@
+//! Messages <-> plain types. Nothing is checked and nothing rounded: stamps pass as their two fields.
+
+use std::time::Duration;
+
+use super::messages::{self, EstimatorStatus, Header, Time};
+use crate::camera;
+use crate::estimation::{Initialisation, Solution};
+use crate::pipeline::{Detection, DetectionFrame, FrameOutcome, Stamp};
+
+impl From<Time> for Stamp {
+    fn from(time: Time) -> Self {
+        Self {
+            sec: time.sec,
+            nanosec: time.nanosec,
+        }
+    }
+}
+
+impl From<Stamp> for Time {
+    fn from(stamp: Stamp) -> Self {
+        Self {
+            sec: stamp.sec,
+            nanosec: stamp.nanosec,
+        }
+    }
+}
+
+/// Returns the detections of a message.
+#[must_use]
+pub fn detection_frame(message: &messages::FeaturePointArray) -> DetectionFrame {
+    let detection = |point: &messages::FeaturePoint| Detection {
+        id: point.id,
+        u_px: point.u,
+        v_px: point.v,
+        sigma_px: point.sigma,
+    };
+    DetectionFrame {
+        stamp: message.header.stamp.into(),
+        frame_id: message.header.frame_id.clone(),
+        detections: message.points.iter().map(detection).collect(),
+    }
+}
+
+/// Returns the camera info of a message, without its header.
+#[must_use]
+pub fn camera_info(message: &messages::CameraInfo) -> camera::CameraInfo {
+    camera::CameraInfo {
+        height: message.height,
+        width: message.width,
+        distortion_model: message.distortion_model.clone(),
+        d: message.d.clone(),
+        k: message.k,
+        r: message.r,
+        p: message.p,
+        binning_x: message.binning_x,
+        binning_y: message.binning_y,
+        roi: camera::RegionOfInterest {
+            x_offset: message.roi.x_offset,
+            y_offset: message.roi.y_offset,
+            height: message.roi.height,
+            width: message.roi.width,
+            do_rectify: message.roi.do_rectify,
+        },
+    }
+}
+
+/// Returns the pose message of a trusted solution.
+#[must_use]
+pub fn pose(header: Header, solution: &Solution) -> messages::PoseWithCovarianceStamped {
+    let translation = &solution.camera_from_tanker.translation.vector;
+    messages::PoseWithCovarianceStamped {
+        header,
+        pose: messages::PoseWithCovariance {
+            pose: messages::Pose {
+                position: messages::Point {
+                    x: translation.x,
+                    y: translation.y,
+                    z: translation.z,
+                },
+                orientation: orientation(solution),
+            },
+            covariance: solution.covariance.row_major(),
+        },
+    }
+}
+
+/// Returns the transform message of a trusted solution.
+#[must_use]
+pub fn transform(
+    header: Header,
+    tanker_frame_id: &str,
+    solution: &Solution,
+) -> messages::TFMessage {
+    let translation = &solution.camera_from_tanker.translation.vector;
+    let transform = messages::TransformStamped {
+        header,
+        child_frame_id: tanker_frame_id.to_owned(),
+        transform: messages::Transform {
+            translation: messages::Vector3 {
+                x: translation.x,
+                y: translation.y,
+                z: translation.z,
+            },
+            rotation: orientation(solution),
+        },
+    };
+    messages::TFMessage {
+        transforms: vec![transform],
+    }
+}
+
+/// Of the two quaternions of a rotation, the one with `w ≥ 0`: the same attitude is always the same
+/// message.
+fn orientation(solution: &Solution) -> messages::Quaternion {
+    let q = solution.camera_from_tanker.rotation.quaternion();
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    messages::Quaternion {
+        x: sign * q.i,
+        y: sign * q.j,
+        z: sign * q.k,
+        w: sign * q.w,
+    }
+}
+
+/// Returns the status message of a frame.
+#[must_use]
+pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> EstimatorStatus {
+    let solution = frame.solution();
+    let number = |of: fn(&Solution) -> f64| solution.map_or(f64::NAN, of);
+    let count = |of: fn(&Solution) -> u16| solution.map_or(0, of);
+    EstimatorStatus {
+        header,
+        outcome: frame.code().number(),
+        message: frame
+            .result
+            .as_ref()
+            .err()
+            .map(ToString::to_string)
+            .unwrap_or_default(),
+        used_ids: frame.used_ids.clone(),
+        rejected_ids: frame.rejected_ids.clone(),
+        rms_residual: number(|solution| solution.rms_px),
+        chi_squared: number(|solution| solution.chi_squared),
+        degrees_of_freedom: count(|solution| solution.degrees_of_freedom),
+        iterations: count(|solution| solution.iterations),
+        initialisation: initialisation(frame.initialisation),
+        ambiguity: number(|solution| solution.ambiguity),
+        solve_time: duration(solve_time),
+    }
+}
+
+const fn initialisation(used: Option<Initialisation>) -> u8 {
+    match used {
+        None => EstimatorStatus::INITIALISATION_NONE,
+        Some(Initialisation::Nominal) => EstimatorStatus::INITIALISATION_NOMINAL,
+        Some(Initialisation::Dlt) => EstimatorStatus::INITIALISATION_DLT,
+        Some(Initialisation::Previous) => EstimatorStatus::INITIALISATION_PREVIOUS,
+        Some(Initialisation::Global) => EstimatorStatus::INITIALISATION_GLOBAL,
+    }
+}
+
+fn duration(duration: Duration) -> messages::Duration {
+    messages::Duration {
+        sec: i32::try_from(duration.as_secs()).unwrap_or(i32::MAX),
+        nanosec: duration.subsec_nanos(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,312 @@
+//! The node's health once a second, for `rqt_robot_monitor` and the like (REP-107).
+
+use std::fmt;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use crate::pipeline::OutcomeCode;
+
+use super::messages::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
+
+/// What is known of the camera.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum CameraState {
+    /// No camera info has arrived.
+    #[default]
+    Missing,
+    /// The latest one can be used.
+    Valid {
+        /// Its frame.
+        frame_id: String,
+        /// Image size in px, if it says one.
+        size_px: Option<(u32, u32)>,
+    },
+    /// The latest one cannot be used.
+    Invalid {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl fmt::Display for CameraState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => write!(f, "none received"),
+            Self::Valid {
+                frame_id,
+                size_px: Some((width, height)),
+            } => {
+                write!(f, "valid, {width}x{height} px, frame {frame_id:?}")
+            }
+            Self::Valid {
+                frame_id,
+                size_px: None,
+            } => write!(f, "valid, frame {frame_id:?}"),
+            Self::Invalid { reason } => write!(f, "invalid: {reason}"),
+        }
+    }
+}
+
+/// What has happened since the node began.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// Frames by outcome, in the order of [`OutcomeCode::ALL`].
+    outcomes: [u64; OutcomeCode::ALL.len()],
+    /// Camera infos received.
+    pub camera_infos: u64,
+    /// Samples that could not be decoded.
+    pub undecodable: u64,
+    /// Messages not sent because a subscriber did not keep up, or for an error.
+    pub dropped: u64,
+}
+
+impl Tally {
+    /// Counts a frame.
+    pub const fn count(&mut self, outcome: OutcomeCode) {
+        self.outcomes[outcome as usize] += 1;
+    }
+
+    /// Returns how many frames had this outcome.
+    #[must_use]
+    pub const fn of(&self, outcome: OutcomeCode) -> u64 {
+        self.outcomes[outcome as usize]
+    }
+
+    /// Returns how many frames there were.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.outcomes.iter().sum()
+    }
+}
+
+/// What the report needs beside the counts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Situation<'a> {
+    /// The node's name without its namespace.
+    pub node: &'a str,
+    /// Name of the marker map.
+    pub marker_map: &'a str,
+    /// What is known of the camera.
+    pub camera: &'a CameraState,
+    /// Message of the last refusal since the last report.
+    pub last_refusal: Option<&'a str>,
+    /// Publishers of `feature_points` in the graph.
+    pub publishers: usize,
+    /// Longest time from a message to its outcome since the last report.
+    pub slowest: Duration,
+}
+
+/// Turns counts into reports; remembers those of the last report for the rates.
+#[derive(Debug, Default)]
+pub struct Reporter {
+    previous: Tally,
+}
+
+impl Reporter {
+    /// Returns how many frames there were up to the last report.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.previous.frames()
+    }
+
+    /// Returns the report of the time since the last one.
+    pub fn report(
+        &mut self,
+        tally: &Tally,
+        elapsed: Duration,
+        situation: &Situation,
+    ) -> DiagnosticArray {
+        let frames = tally.frames().saturating_sub(self.previous.frames());
+        let estimates = tally
+            .of(OutcomeCode::Ok)
+            .saturating_sub(self.previous.of(OutcomeCode::Ok));
+        let dropped = tally.dropped.saturating_sub(self.previous.dropped);
+        let (level, message) = judge(frames, estimates, dropped, situation);
+        let status = DiagnosticStatus {
+            level,
+            name: format!("{}: estimation", situation.node),
+            message,
+            hardware_id: match situation.camera {
+                CameraState::Valid { frame_id, .. } => frame_id.clone(),
+                CameraState::Missing | CameraState::Invalid { .. } => String::new(),
+            },
+            values: values(tally, frames, estimates, elapsed, situation),
+        };
+        self.previous = tally.clone();
+        DiagnosticArray {
+            header: Header {
+                stamp: now(),
+                ..Header::default()
+            },
+            status: vec![status],
+        }
+    }
+}
+
+/// Returns the level and the summary of the last period.
+fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u8, String) {
+    let refused = frames.saturating_sub(estimates);
+    let why = situation.last_refusal.unwrap_or("see status");
+    if frames == 0 {
+        let message = match situation.publishers {
+            0 => "no feature_points: no publisher".to_owned(),
+            n => format!("no feature_points, though {n} publisher(s) exist: check QoS and network"),
+        };
+        (DiagnosticStatus::STALE, message)
+    } else if estimates == 0 {
+        (
+            DiagnosticStatus::ERROR,
+            format!("all {frames} frames refused: {why}"),
+        )
+    } else if refused > 0 {
+        (
+            DiagnosticStatus::WARN,
+            format!("{refused} of {frames} frames refused: {why}"),
+        )
+    } else if dropped > 0 {
+        (
+            DiagnosticStatus::WARN,
+            format!("{dropped} messages dropped: a subscriber does not keep up"),
+        )
+    } else {
+        (DiagnosticStatus::OK, format!("{estimates} estimates"))
+    }
+}
+
+fn values(
+    tally: &Tally,
+    frames: u64,
+    estimates: u64,
+    elapsed: Duration,
+    situation: &Situation,
+) -> Vec<KeyValue> {
+    let rate = |count: u64| format!("{:.1}", count as f64 / elapsed.as_secs_f64().max(1e-3));
+    let refused = tally.frames() - tally.of(OutcomeCode::Ok);
+    let mut pairs = vec![
+        ("frames".to_owned(), tally.frames().to_string()),
+        (
+            "estimates".to_owned(),
+            tally.of(OutcomeCode::Ok).to_string(),
+        ),
+        ("refusals".to_owned(), refused.to_string()),
+        ("frame_rate_hz".to_owned(), rate(frames)),
+        ("estimate_rate_hz".to_owned(), rate(estimates)),
+        (
+            "slowest_solve_ms".to_owned(),
+            format!("{:.3}", situation.slowest.as_secs_f64() * 1e3),
+        ),
+        ("camera_info".to_owned(), situation.camera.to_string()),
+        ("camera_infos".to_owned(), tally.camera_infos.to_string()),
+        ("marker_map".to_owned(), situation.marker_map.to_owned()),
+        (
+            "last_message".to_owned(),
+            situation.last_refusal.unwrap_or_default().to_owned(),
+        ),
+        ("publishers".to_owned(), situation.publishers.to_string()),
+        ("undecodable".to_owned(), tally.undecodable.to_string()),
+        ("dropped".to_owned(), tally.dropped.to_string()),
+    ];
+    // All of them, also those at zero: who plots a value needs its key from the beginning.
+    pairs.extend(
+        OutcomeCode::ALL
+            .iter()
+            .filter(|outcome| **outcome != OutcomeCode::Ok)
+            .map(|outcome| {
+                (
+                    format!("refusals.{}", outcome.name()),
+                    tally.of(*outcome).to_string(),
+                )
+            }),
+    );
+    pairs
+        .into_iter()
+        .map(|(key, value)| KeyValue { key, value })
+        .collect()
+}
+
+fn now() -> Time {
+    let since_epoch = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Time {
+        sec: i32::try_from(since_epoch.as_secs()).unwrap_or(i32::MAX),
+        nanosec: since_epoch.subsec_nanos(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    fn situation(camera: &CameraState) -> Situation<'_> {
+        Situation {
+            node: "tanker_pose",
+            marker_map: "paper",
+            camera,
+            last_refusal: Some("need 4 points, got 3"),
+            publishers: 1,
+            slowest: Duration::from_micros(1500),
+        }
+    }
+
+    fn report(reporter: &mut Reporter, tally: &Tally) -> DiagnosticStatus {
+        let camera = CameraState::Missing;
+        reporter
+            .report(tally, SECOND, &situation(&camera))
+            .status
+            .remove(0)
+    }
+
+    fn value<'a>(status: &'a DiagnosticStatus, key: &str) -> &'a str {
+        &status
+            .values
+            .iter()
+            .find(|pair| pair.key == key)
+            .expect("the key is there")
+            .value
+    }
+
+    #[test]
+    fn level_follows_the_last_period_and_counts_go_on() {
+        let (mut reporter, mut tally) = (Reporter::default(), Tally::default());
+        assert_eq!(report(&mut reporter, &tally).level, DiagnosticStatus::STALE);
+
+        tally.count(OutcomeCode::TooFewPoints);
+        let status = report(&mut reporter, &tally);
+        assert_eq!(status.level, DiagnosticStatus::ERROR);
+        assert!(
+            status.message.contains("need 4 points"),
+            "{}",
+            status.message
+        );
+
+        tally.count(OutcomeCode::Ok);
+        tally.count(OutcomeCode::TooFewPoints);
+        assert_eq!(report(&mut reporter, &tally).level, DiagnosticStatus::WARN);
+
+        tally.count(OutcomeCode::Ok);
+        let status = report(&mut reporter, &tally);
+        assert_eq!(status.level, DiagnosticStatus::OK);
+        assert_eq!(value(&status, "frames"), "4");
+        assert_eq!(value(&status, "estimates"), "2");
+        assert_eq!(value(&status, "refusals.TOO_FEW_POINTS"), "2");
+        assert_eq!(value(&status, "refusals.AMBIGUOUS"), "0");
+        assert_eq!(value(&status, "frame_rate_hz"), "1.0");
+        assert_eq!(value(&status, "slowest_solve_ms"), "1.500");
+    }
+
+    #[test]
+    fn dropped_messages_are_warned_of() {
+        let (mut reporter, mut tally) = (Reporter::default(), Tally::default());
+        tally.count(OutcomeCode::Ok);
+        tally.dropped = 3;
+        assert_eq!(report(&mut reporter, &tally).level, DiagnosticStatus::WARN);
+    }
+
+    #[test]
+    fn name_is_node_and_subtask() {
+        let status = report(&mut Reporter::default(), &Tally::default());
+        assert_eq!(status.name, "tanker_pose: estimation");
+    }
+}

@@ -1,0 +1,281 @@
+//! What the node does with one message: convert, call the pipeline, convert, publish.
+
+use std::time::{Duration, Instant};
+
+use ros2_client::{Publisher, WriteError};
+
+use super::convert;
+use super::diagnostics::{CameraState, Reporter, Situation, Tally};
+use super::messages::{
+    CameraInfo, DiagnosticArray, EstimatorStatus, FeaturePointArray, Header, Message,
+    PoseWithCovarianceStamped, TFMessage,
+};
+use super::once::SaidOnce;
+use crate::camera;
+use crate::config::Settings;
+use crate::estimation::Solution;
+use crate::pipeline::{OutcomeCode, Pipeline, Stamp};
+
+/// Seconds without detections before that is said.
+const SILENCE_S: u32 = 3;
+
+/// A topic that never makes the node wait: what a slow subscriber has no room for is dropped and
+/// counted.
+pub struct Output<M: Message> {
+    publisher: Publisher<M>,
+    topic: String,
+    said: SaidOnce<()>,
+}
+
+impl<M: Message> Output<M> {
+    /// Returns the output to `topic` through `publisher`.
+    #[must_use]
+    pub fn new(publisher: Publisher<M>, topic: String) -> Self {
+        Self {
+            publisher,
+            topic,
+            said: SaidOnce::default(),
+        }
+    }
+
+    fn publish(&mut self, message: M, tally: &mut Tally) {
+        let Err(error) = self.publisher.publish(message) else {
+            if let Some(count) = self.said.good() {
+                log::info!(
+                    "publishing {} again after {count} dropped messages",
+                    self.topic
+                );
+            }
+            return;
+        };
+        tally.dropped += 1;
+        if self.said.fault((), Instant::now()) {
+            if let WriteError::WouldBlock { .. } = error {
+                log::warn!(
+                    "a subscriber of {} does not keep up: messages are dropped",
+                    self.topic
+                );
+            } else {
+                log::error!("cannot publish {}: {error}", self.topic);
+            }
+        }
+    }
+}
+
+/// Where the node's results go.
+pub struct Outputs {
+    /// Trusted poses.
+    pub pose: Output<PoseWithCovarianceStamped>,
+    /// One message for every frame.
+    pub status: Output<EstimatorStatus>,
+    /// Trusted poses as transforms, if wanted, with the name of the child frame.
+    pub transform: Option<(Output<TFMessage>, String)>,
+    /// The node's health.
+    pub diagnostics: Output<DiagnosticArray>,
+}
+
+/// The pipeline between its messages.
+pub struct Estimator {
+    pipeline: Pipeline,
+    outputs: Outputs,
+    node: String,
+    marker_map: String,
+    /// The latest camera info as it came, for when the settings change how it is read.
+    latest_info: Option<(camera::CameraInfo, String)>,
+    camera: CameraState,
+    tally: Tally,
+    reporter: Reporter,
+    last_refusal: Option<String>,
+    slowest: Duration,
+    last_report: Instant,
+    refusals: SaidOnce<OutcomeCode>,
+    bad_camera: SaidOnce<()>,
+    bad_samples: SaidOnce<&'static str>,
+    silence: SaidOnce<(bool, bool)>,
+    silent_seconds: u32,
+    own_child: SaidOnce<()>,
+}
+
+impl Estimator {
+    /// Returns an estimator that has not seen a message yet, for the node of this name.
+    #[must_use]
+    pub fn new(pipeline: Pipeline, outputs: Outputs, node: &str, marker_map: &str) -> Self {
+        Self {
+            pipeline,
+            outputs,
+            node: node.to_owned(),
+            marker_map: marker_map.to_owned(),
+            latest_info: None,
+            camera: CameraState::Missing,
+            tally: Tally::default(),
+            reporter: Reporter::default(),
+            last_refusal: None,
+            slowest: Duration::ZERO,
+            last_report: Instant::now(),
+            refusals: SaidOnce::default(),
+            bad_camera: SaidOnce::default(),
+            bad_samples: SaidOnce::default(),
+            silence: SaidOnce::default(),
+            silent_seconds: 0,
+            own_child: SaidOnce::default(),
+        }
+    }
+
+    /// Takes a camera info.
+    pub fn on_camera_info(&mut self, message: &CameraInfo) {
+        self.tally.camera_infos += 1;
+        let info = convert::camera_info(message);
+        self.set_camera(&info, &message.header.frame_id);
+        self.latest_info = Some((info, message.header.frame_id.clone()));
+    }
+
+    /// Takes the detections of an image; publishes what becomes of them.
+    pub fn on_feature_points(&mut self, message: FeaturePointArray) {
+        let begin = Instant::now();
+        let frame = convert::detection_frame(&message);
+        let outcome = self.pipeline.process(&frame);
+        let solve_time = begin.elapsed();
+
+        let header = message.header;
+        if let Ok(solution) = &outcome.result {
+            self.outputs
+                .pose
+                .publish(convert::pose(header.clone(), solution), &mut self.tally);
+            self.publish_transform(&header, solution);
+        }
+        let status = convert::status(header, &outcome, solve_time);
+        self.take_note(outcome.code(), &status.message, frame.stamp, solve_time);
+        self.outputs.status.publish(status, &mut self.tally);
+    }
+
+    /// Takes changed settings, for the next frame on.
+    pub fn on_settings(&mut self, settings: Settings) {
+        self.pipeline.set_settings(settings);
+        // Whether the image is rectified decides how a camera info is read.
+        if let Some((info, frame_id)) = self.latest_info.take() {
+            self.set_camera(&info, &frame_id);
+            self.latest_info = Some((info, frame_id));
+        }
+    }
+
+    /// Takes note of a sample on `topic` that could not be decoded.
+    pub fn on_undecodable(&mut self, topic: &'static str, error: &ros2_client::ReadError) {
+        self.tally.undecodable += 1;
+        if self.bad_samples.fault(topic, Instant::now()) {
+            log::warn!("cannot decode a sample of {topic}: {error}");
+        }
+    }
+
+    /// Publishes the diagnostics; `publishers`: of `feature_points`, in the graph.
+    pub fn on_second(&mut self, publishers: usize, now: Instant) {
+        let situation = Situation {
+            node: &self.node,
+            marker_map: &self.marker_map,
+            camera: &self.camera,
+            last_refusal: self.last_refusal.as_deref(),
+            publishers,
+            slowest: self.slowest,
+        };
+        let elapsed = now.saturating_duration_since(self.last_report);
+        let frames_before = self.reporter.frames();
+        let report = self.reporter.report(&self.tally, elapsed, &situation);
+        self.outputs.diagnostics.publish(report, &mut self.tally);
+        self.watch_silence(self.tally.frames() > frames_before, publishers, now);
+        self.last_refusal = None;
+        self.slowest = Duration::ZERO;
+        self.last_report = now;
+    }
+
+    fn publish_transform(&mut self, header: &Header, solution: &Solution) {
+        let Some((output, child)) = &mut self.outputs.transform else {
+            return;
+        };
+        if *child == header.frame_id {
+            if self.own_child.fault((), Instant::now()) {
+                log::warn!(
+                    "no transform: the camera's frame and tanker_frame_id are both {child:?}"
+                );
+            }
+            return;
+        }
+        output.publish(
+            convert::transform(header.clone(), child, solution),
+            &mut self.tally,
+        );
+    }
+
+    fn set_camera(&mut self, info: &camera::CameraInfo, frame_id: &str) {
+        let state = match self.pipeline.set_camera(info, frame_id) {
+            Ok(_) => CameraState::Valid {
+                frame_id: frame_id.to_owned(),
+                size_px: self
+                    .pipeline
+                    .camera()
+                    .and_then(camera::Camera::image_size_px),
+            },
+            Err(error) => CameraState::Invalid {
+                reason: error.to_string(),
+            },
+        };
+        if let CameraState::Invalid { reason } = &state {
+            if self.bad_camera.fault((), Instant::now()) {
+                log::warn!("this camera info cannot be used: {reason}");
+            }
+        } else {
+            let recovered = self.bad_camera.good().is_some();
+            if recovered || self.camera == CameraState::Missing {
+                log::info!("camera info is {state}");
+            }
+        }
+        self.camera = state;
+    }
+
+    fn take_note(
+        &mut self,
+        outcome: OutcomeCode,
+        message: &str,
+        stamp: Stamp,
+        solve_time: Duration,
+    ) {
+        self.tally.count(outcome);
+        self.slowest = self.slowest.max(solve_time);
+        if outcome == OutcomeCode::Ok {
+            if let Some(count) = self.refusals.good() {
+                log::info!("estimates resume after {count} refused frames");
+            }
+            return;
+        }
+        self.last_refusal = Some(message.to_owned());
+        if self.refusals.fault(outcome, Instant::now()) {
+            let (sec, nanosec) = (stamp.sec, stamp.nanosec);
+            log::warn!(
+                "refused from {sec}.{nanosec:09} on, {}: {message}",
+                outcome.name()
+            );
+        }
+    }
+
+    /// Says when detections do not come, after a while, and when they do.
+    fn watch_silence(&mut self, arrived: bool, publishers: usize, now: Instant) {
+        if arrived {
+            self.silent_seconds = 0;
+            if self.silence.good().is_some() {
+                log::info!("feature_points arrive");
+            }
+            return;
+        }
+        self.silent_seconds = self.silent_seconds.saturating_add(1);
+        let ever = self.tally.frames() > 0;
+        if self.silent_seconds < SILENCE_S || !self.silence.fault((ever, publishers > 0), now) {
+            return;
+        }
+        match (ever, publishers) {
+            (false, 0) => log::info!("waiting for feature_points: nobody publishes them yet"),
+            (false, n) => log::warn!(
+                "feature_points have {n} publisher(s), but nothing has arrived: check QoS and network"
+            ),
+            (true, 0) => log::warn!("feature_points have stopped: their publisher is gone"),
+            (true, n) => log::warn!("feature_points have stopped, though {n} publisher(s) exist"),
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Log messages to the console as ROS nodes print them, and to /rosout.
+//!
+//! The library below only uses the `log` crate; where its lines go is decided here.
+
+use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{OnceLock, PoisonError, RwLock};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use log::{Level, Log, Metadata, Record};
+use ros2_client::builtin_interfaces::Time;
+use ros2_client::ros2::LogLevel;
+use ros2_client::{NodeLoggingHandle, RosoutRaw};
+
+use super::arguments::Arguments;
+use super::names::NodeNames;
+
+/// This package's own lines from info on. The middleware's from error on: it warns of every packet
+/// that is not its own.
+const DEFAULT_FILTER: &str = "info,rustdds=error,ros2_client=error";
+/// The crates whose lines never go to /rosout: publishing them would bring forth more of them.
+const MIDDLEWARE: [&str; 2] = ["rustdds", "ros2_client"];
+/// Where the client library repeats what it published to /rosout.
+const ECHO: &str = "ros2_client::rosout";
+/// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
+const FALSE_ALARM_AT_END: &str = "rustdds::network";
+
+static LOGGER: OnceLock<NodeLog> = OnceLock::new();
+
+struct NodeLog {
+    console: env_logger::Logger,
+    console_on: bool,
+    name: String,
+    rosout: RwLock<Option<NodeLoggingHandle>>,
+    leaving: AtomicBool,
+}
+
+/// Starts logging for the node of this name. What `--log-level` says goes before `RUST_LOG`, and that
+/// before the defaults. A second call has no effect.
+pub fn start(arguments: &Arguments, names: &NodeNames) {
+    let name = logger_name(names);
+    let mut builder = env_logger::Builder::new();
+    builder.parse_filters(DEFAULT_FILTER);
+    if let Ok(filters) = std::env::var("RUST_LOG") {
+        builder.parse_filters(&filters);
+    }
+    for (logger, level) in &arguments.log_levels {
+        match logger {
+            None => builder.filter(None, *level),
+            Some(logger) => builder.filter(Some(&module(logger, &name, names)), *level),
+        };
+    }
+    let line_name = name.clone();
+    builder.format(move |out, record| write_line(out, record, &line_name));
+    let logger = NodeLog {
+        console: builder.build(),
+        console_on: arguments.console_logs,
+        name,
+        rosout: RwLock::new(None),
+        leaving: AtomicBool::new(false),
+    };
+    let level = logger.console.filter();
+    if LOGGER.set(logger).is_ok()
+        && let Some(logger) = LOGGER.get()
+        && log::set_logger(logger).is_ok()
+    {
+        log::set_max_level(level);
+    }
+}
+
+/// Sends log messages to /rosout too, from now on.
+pub fn start_rosout(handle: NodeLoggingHandle) {
+    set_rosout(Some(handle), false);
+}
+
+/// Ends what [`start_rosout`] began: the handle holds a publisher of the node, which has to be gone
+/// before the node is.
+pub fn stop_rosout() {
+    set_rosout(None, true);
+}
+
+fn set_rosout(handle: Option<NodeLoggingHandle>, leaving: bool) {
+    if let Some(logger) = LOGGER.get() {
+        let mut rosout = logger
+            .rosout
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        *rosout = handle;
+        logger.leaving.store(leaving, Ordering::Relaxed);
+    }
+}
+
+/// Returns the name that rcl gives to the logger of a node: namespace and name, joined by dots.
+fn logger_name(names: &NodeNames) -> String {
+    names
+        .fully_qualified()
+        .trim_start_matches('/')
+        .replace('/', ".")
+}
+
+/// The node's own logger is this crate; any other is named as its crate is.
+fn module(logger: &str, own: &str, names: &NodeNames) -> String {
+    if logger == own || logger == names.base_name() {
+        env!("CARGO_CRATE_NAME").to_owned()
+    } else {
+        logger.replace('.', "::")
+    }
+}
+
+fn write_line(
+    out: &mut env_logger::fmt::Formatter,
+    record: &Record,
+    name: &str,
+) -> std::io::Result<()> {
+    let since_epoch = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    let (sec, nanosec) = (since_epoch.as_secs(), since_epoch.subsec_nanos());
+    let style = out.default_level_style(record.level());
+    let who = if is_middleware(record.target()) {
+        record.target()
+    } else {
+        name
+    };
+    writeln!(
+        out,
+        "{style}[{}] [{sec}.{nanosec:09}] [{who}]: {}{style:#}",
+        record.level(),
+        record.args()
+    )
+}
+
+fn is_middleware(target: &str) -> bool {
+    MIDDLEWARE.iter().any(|name| {
+        target
+            .strip_prefix(name)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
+    })
+}
+
+impl Log for NodeLog {
+    fn enabled(&self, metadata: &Metadata) -> bool {
+        self.console.enabled(metadata)
+    }
+
+    fn log(&self, record: &Record) {
+        if !self.console.matches(record) || record.target().starts_with(ECHO) {
+            return;
+        }
+        let leaving = self.leaving.load(Ordering::Relaxed);
+        if leaving && record.target().starts_with(FALSE_ALARM_AT_END) {
+            return;
+        }
+        if self.console_on {
+            self.console.log(record);
+        }
+        if is_middleware(record.target()) {
+            return;
+        }
+        let rosout = self.rosout.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(handle) = rosout.as_ref() {
+            handle.rosout_raw(
+                Time::now(),
+                ros_level(record.level()),
+                &self.name,
+                &record.args().to_string(),
+                record.file().unwrap_or_default(),
+                record.module_path().unwrap_or_default(),
+                record.line().unwrap_or_default(),
+            );
+        }
+    }
+
+    fn flush(&self) {
+        self.console.flush();
+    }
+}
+
+const fn ros_level(level: Level) -> LogLevel {
+    match level {
+        Level::Error => LogLevel::Error,
+        Level::Warn => LogLevel::Warn,
+        Level::Info => LogLevel::Info,
+        Level::Debug | Level::Trace => LogLevel::Debug,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use log::LevelFilter;
+
+    use super::*;
+
+    #[test]
+    fn middleware_is_known_by_its_crate_and_not_by_a_prefix_of_letters() {
+        assert!(is_middleware("rustdds::rtps::reader"));
+        assert!(is_middleware("ros2_client"));
+        assert!(!is_middleware("rustdds_tools"));
+        assert!(!is_middleware("tanker_pose::ros::node"));
+    }
+
+    #[test]
+    fn loggers_are_named_as_in_ros() {
+        let names = NodeNames::new("tanker_pose", &[]).expect("the default name is valid");
+        assert_eq!(logger_name(&names), "tanker_pose");
+        assert_eq!(module("tanker_pose", "tanker_pose", &names), "tanker_pose");
+        assert_eq!(
+            module("rustdds.rtps", "tanker_pose", &names),
+            "rustdds::rtps"
+        );
+    }
+
+    #[test]
+    fn default_filter_keeps_own_lines_and_quietens_the_middleware() {
+        let mut builder = env_logger::Builder::new();
+        builder.parse_filters(DEFAULT_FILTER);
+        builder.filter(None, LevelFilter::Debug); // as --log-level debug does
+        let logger = builder.build();
+        let enabled = |target: &str, level| {
+            logger.enabled(&Metadata::builder().target(target).level(level).build())
+        };
+        assert!(enabled("tanker_pose::ros::node", Level::Debug));
+        assert!(!enabled("rustdds::rtps", Level::Warn));
+        assert!(enabled("rustdds::rtps", Level::Error));
+    }
+}

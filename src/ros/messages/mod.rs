@@ -1,0 +1,62 @@
+//! The ROS messages this package speaks, as serde structs in the order of their `.msg` files.
+//!
+//! CDR carries no field names: the order of the fields here **is** the wire format, so a field is
+//! never moved without its `.msg` file. Nothing is checked here: a decoded message may hold anything
+//! that its bytes can say. `convert` turns messages into plain types, and the floors below check them.
+
+use serde::{Deserialize, Serialize};
+
+mod estimator_status;
+mod standard;
+
+pub use estimator_status::EstimatorStatus;
+pub use standard::*;
+
+/// A message type's place in the ROS type system: `package/msg/name`.
+pub trait Message: Serialize + for<'de> Deserialize<'de> + 'static {
+    /// ROS package that defines the message.
+    const PACKAGE: &'static str;
+    /// Name of the message in its package.
+    const NAME: &'static str;
+}
+
+/// `tanker_pose/FeaturePoint`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct FeaturePoint {
+    /// Marker id in the tanker's marker map.
+    pub id: u32,
+    /// Column of the detected centre, px; the centre of the top-left pixel is (0, 0).
+    pub u: f64,
+    /// Row of the detected centre, px.
+    pub v: f64,
+    /// Standard deviation of column and of row, px; 0: not known.
+    pub sigma: f64,
+}
+
+/// `tanker_pose/FeaturePointArray`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct FeaturePointArray {
+    /// Time of the image and the camera's optical frame.
+    pub header: Header,
+    /// The detections of one image.
+    pub points: Vec<FeaturePoint>,
+}
+
+macro_rules! ros_message {
+    ($($package:literal / $name:ident),+ $(,)?) => {$(
+        impl Message for $name {
+            const PACKAGE: &'static str = $package;
+            const NAME: &'static str = stringify!($name);
+        }
+    )+};
+}
+
+ros_message!(
+    "geometry_msgs" / PoseStamped,
+    "geometry_msgs" / PoseWithCovarianceStamped,
+    "sensor_msgs" / CameraInfo,
+    "tf2_msgs" / TFMessage,
+    "diagnostic_msgs" / DiagnosticArray,
+    "tanker_pose" / FeaturePointArray,
+    "tanker_pose" / EstimatorStatus,
+);

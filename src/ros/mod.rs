@@ -1,0 +1,30 @@
+//! The node and its graph: the only floor that knows ros2-client, files, clocks and signals.
+//!
+//! ```text
+//! arguments, environment, names      what the command line and the variables ask for, checked
+//! parameter_file, start_values       parameters at the start: defaults, files, arguments
+//! parameters                         parameters while the node runs, behind its services
+//! participant, leave                 into the graph, and out of it
+//! messages, convert                  the wire <-> plain types
+//! estimator, diagnostics             one message's work, and the node's health once a second
+//! logging, once                      what is said about it, and how often
+//! node                               all of it together, until a signal
+//! ```
+//!
+//! Tools that talk ROS start from [`participant::RosNode::open`].
+
+pub mod arguments;
+pub mod convert;
+pub mod diagnostics;
+pub mod environment;
+pub mod estimator;
+pub mod leave;
+pub mod logging;
+pub mod messages;
+pub mod names;
+pub mod node;
+pub mod once;
+pub mod parameter_file;
+pub mod parameters;
+pub mod participant;
+pub mod start_values;

@@ -1,0 +1,274 @@
+//! Names as rcl makes them: expanded first, remapped then, absolute at the end.
+//!
+//! ros2-client gets absolute names only: it turns a relative name in the root namespace into
+//! `//name`, and knows neither `~` nor remaps.
+
+use ros2_client::{Name, NodeName};
+use ros2args::{RemapRule, Ros2ArgsError};
+
+/// A node's own name with the rules that rename its topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NodeNames {
+    namespace: String,
+    base_name: String,
+    rules: Vec<RemapRule>,
+}
+
+/// Why a name cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NamesError {
+    /// A node name, namespace or topic name that ROS does not allow.
+    #[error("{0}")]
+    Invalid(Ros2ArgsError),
+    /// Allowed by ROS, but not by the client library.
+    #[error("{name:?} cannot be used as a name: {reason}")]
+    Unsupported {
+        /// The expanded name.
+        name: String,
+        /// What the client library objects to.
+        reason: String,
+    },
+    /// A remap of something that begins with two underscores and is not known.
+    #[error(
+        "cannot remap {from:?}: of the names with two underscores only __node, __name and __ns exist"
+    )]
+    UnknownSpecial {
+        /// Left side of the rule.
+        from: String,
+    },
+}
+
+impl From<Ros2ArgsError> for NamesError {
+    fn from(error: Ros2ArgsError) -> Self {
+        Self::Invalid(error)
+    }
+}
+
+impl NodeNames {
+    /// Returns the names of a node that calls itself `default_name` in `/` unless a rule says otherwise.
+    ///
+    /// # Errors
+    /// [`NamesError`] when the node's name, its namespace or a rule is malformed.
+    pub fn new(default_name: &str, rules: &[RemapRule]) -> Result<Self, NamesError> {
+        if let Some(rule) = rules.iter().find(|rule| is_unknown_special(rule)) {
+            return Err(NamesError::UnknownSpecial {
+                from: rule.from.clone(),
+            });
+        }
+        let renamed = |node: &str, specials: &[&str]| {
+            rules
+                .iter()
+                .find(|rule| specials.contains(&rule.from.as_str()) && rule.applies_to_node(node))
+                .map(|rule| rule.to.clone())
+        };
+        // The order is rcl's: rules for the namespace are looked up under the new name.
+        let base_name =
+            renamed(default_name, &["__node", "__name"]).unwrap_or_else(|| default_name.to_owned());
+        let namespace = renamed(&base_name, &["__ns"]).unwrap_or_else(|| "/".to_owned());
+        ros2args::validate_node_name(&base_name)?;
+        ros2args::validate_namespace(&namespace)?;
+        let names = Self {
+            namespace,
+            base_name,
+            rules: rules.to_vec(),
+        };
+        // The parameter services live under the node's name, and their creation panics on a name
+        // that the client library does not take.
+        names.client_name(&format!("{}/get_parameters", names.fully_qualified()))?;
+        for rule in names.topic_rules() {
+            names.expand(topic_side(&rule.from))?;
+            names.expand(topic_side(&rule.to))?;
+        }
+        Ok(names)
+    }
+
+    /// The node's name without its namespace.
+    #[must_use]
+    pub fn base_name(&self) -> &str {
+        &self.base_name
+    }
+
+    /// The node's namespace; `/` is the root.
+    #[must_use]
+    pub fn namespace(&self) -> &str {
+        &self.namespace
+    }
+
+    /// Returns the node's absolute name.
+    #[must_use]
+    pub fn fully_qualified(&self) -> String {
+        ros2args::build_node_fqn(&self.namespace, &self.base_name)
+    }
+
+    /// Returns the absolute name of a topic (relative, `~/private` or absolute), remapped.
+    ///
+    /// # Errors
+    /// [`NamesError::Invalid`] when it is no valid topic name.
+    pub fn topic(&self, name: &str) -> Result<String, NamesError> {
+        let expanded = self.expand(name)?;
+        for rule in self.topic_rules() {
+            if self.expand(topic_side(&rule.from))? == expanded {
+                return self.expand(topic_side(&rule.to));
+            }
+        }
+        Ok(expanded)
+    }
+
+    /// Returns [`Self::topic`] in the client library's type.
+    ///
+    /// # Errors
+    /// As [`Self::topic`], and [`NamesError::Unsupported`] where the client library is stricter than ROS.
+    pub fn client_topic(&self, name: &str) -> Result<Name, NamesError> {
+        self.client_name(&self.topic(name)?)
+    }
+
+    /// Returns the node's name in the client library's type.
+    ///
+    /// # Errors
+    /// [`NamesError::Unsupported`] where the client library is stricter than ROS.
+    pub fn client_node(&self) -> Result<NodeName, NamesError> {
+        NodeName::new(&self.namespace, &self.base_name).map_err(|error| NamesError::Unsupported {
+            name: self.fully_qualified(),
+            reason: error.to_string(),
+        })
+    }
+
+    #[expect(clippy::unused_self, reason = "reads better next to `client_topic`")]
+    fn client_name(&self, absolute: &str) -> Result<Name, NamesError> {
+        Name::parse(absolute).map_err(|error| NamesError::Unsupported {
+            name: absolute.to_owned(),
+            reason: error.to_string(),
+        })
+    }
+
+    fn expand(&self, name: &str) -> Result<String, NamesError> {
+        Ok(ros2args::expand_topic_name(
+            &self.namespace,
+            &self.base_name,
+            name,
+        )?)
+    }
+
+    fn topic_rules(&self) -> impl Iterator<Item = &RemapRule> {
+        self.rules.iter().filter(|rule| {
+            let applies = is_topic_scheme(rule) || rule.applies_to_node(&self.base_name);
+            applies && !rule.from.starts_with("__") && !is_service_scheme(rule)
+        })
+    }
+}
+
+/// `rostopic://name` is a remap of topics only; the argument parser takes the scheme for a node's name.
+fn is_topic_scheme(rule: &RemapRule) -> bool {
+    rule.node_name.as_deref() == Some("rostopic") && rule.from.starts_with("//")
+}
+
+fn is_service_scheme(rule: &RemapRule) -> bool {
+    rule.node_name.as_deref() == Some("rosservice") && rule.from.starts_with("//")
+}
+
+fn topic_side(side: &str) -> &str {
+    side.strip_prefix("rostopic:")
+        .unwrap_or(side)
+        .strip_prefix("//")
+        .unwrap_or(side)
+}
+
+fn is_unknown_special(rule: &RemapRule) -> bool {
+    rule.from.starts_with("__") && !["__node", "__name", "__ns"].contains(&rule.from.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rule(text: &str) -> RemapRule {
+        let arguments = ["--ros-args", "-r", text];
+        let (parsed, _) =
+            ros2args::Ros2Args::from_args(arguments).expect("the rule is well formed");
+        parsed.remap_rules[0].clone()
+    }
+
+    fn names(rules: &[&str]) -> NodeNames {
+        let rules: Vec<_> = rules.iter().map(|text| rule(text)).collect();
+        NodeNames::new("tanker_pose", &rules).expect("the rules are valid")
+    }
+
+    #[test]
+    fn relative_private_and_absolute_names_expand_as_in_rcl() {
+        let names = names(&["__ns:=/uav1", "__node:=estimator"]);
+        assert_eq!(names.fully_qualified(), "/uav1/estimator");
+        assert_eq!(names.topic("pose").expect("valid"), "/uav1/pose");
+        assert_eq!(
+            names.topic("~/pose").expect("valid"),
+            "/uav1/estimator/pose"
+        );
+        assert_eq!(names.topic("/tf").expect("valid"), "/tf");
+    }
+
+    #[test]
+    fn root_namespace_gives_one_slash() {
+        assert_eq!(names(&[]).topic("pose").expect("valid"), "/pose");
+    }
+
+    #[test]
+    fn namespaced_remap_applies_to_relative_topic() {
+        let names = names(&[
+            "__ns:=/uav1",
+            "pose:=tanker/pose",
+            "camera_info:=/camera/camera_info",
+        ]);
+        assert_eq!(names.topic("pose").expect("valid"), "/uav1/tanker/pose");
+        assert_eq!(
+            names.topic("camera_info").expect("valid"),
+            "/camera/camera_info"
+        );
+    }
+
+    #[test]
+    fn remap_matches_expanded_names_not_texts() {
+        let names = names(&["__ns:=/uav1", "/uav1/pose:=a", "/tf:=tf"]);
+        assert_eq!(names.topic("pose").expect("valid"), "/uav1/a");
+        assert_eq!(names.topic("/tf").expect("valid"), "/uav1/tf");
+    }
+
+    #[test]
+    fn first_matching_rule_wins_and_is_not_applied_twice() {
+        let names = names(&["pose:=status", "pose:=other", "status:=pose"]);
+        assert_eq!(names.topic("pose").expect("valid"), "/status");
+        assert_eq!(names.topic("status").expect("valid"), "/pose");
+    }
+
+    #[test]
+    fn rules_for_another_node_do_not_apply() {
+        let names = names(&["other:pose:=a", "other:__node:=b", "tanker_pose:status:=c"]);
+        assert_eq!(names.base_name(), "tanker_pose");
+        assert_eq!(names.topic("pose").expect("valid"), "/pose");
+        assert_eq!(names.topic("status").expect("valid"), "/c");
+    }
+
+    #[test]
+    fn rostopic_rules_rename_topics_and_rosservice_rules_do_not() {
+        let names = names(&["rostopic://pose:=a", "rosservice://status:=b"]);
+        assert_eq!(names.topic("pose").expect("valid"), "/a");
+        assert_eq!(names.topic("status").expect("valid"), "/status");
+    }
+
+    #[test]
+    fn malformed_names_are_refused_with_a_reason() {
+        for wrong in [
+            "__ns:=uav1",
+            "__ns:=/uav1/",
+            "__node:=a/b",
+            "__node:=1a",
+            "pose:=a//b",
+            "__foo:=b",
+        ] {
+            let refused = NodeNames::new("tanker_pose", &[rule(wrong)]);
+            assert!(refused.is_err(), "{wrong}");
+        }
+        // Two underscores in a row are allowed by ROS, and would make the client library panic later.
+        let doubled = NodeNames::new("tanker_pose", &[rule("__node:=a__b")]);
+        assert!(doubled.is_err());
+    }
+}

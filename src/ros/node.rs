@@ -1,0 +1,219 @@
+//! The node: parameters and marker map in, topics open, messages to the estimator until a signal.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use async_signal::{Signal, Signals};
+use futures::{StreamExt, pin_mut, select_biased};
+use ros2_client::{NodeOptions, Subscription};
+
+use super::arguments::Arguments;
+use super::environment::Environment;
+use super::estimator::{Estimator, Output, Outputs};
+use super::logging;
+use super::messages::{CameraInfo, FeaturePointArray, Message};
+use super::names::{NamesError, NodeNames};
+use super::parameters::SharedParameters;
+use super::participant::{EndpointError, OpenError, QosProfile, RosNode, reliable, sensor_data};
+use super::start_values::{StartParameterError, start_values};
+use crate::config::Configuration;
+use crate::pipeline::Pipeline;
+use crate::target::{MarkerMap, MarkerMapError};
+
+/// What the node is called unless it is remapped.
+pub const NODE_NAME: &str = "tanker_pose";
+
+const FEATURE_POINTS: &str = "feature_points";
+const CAMERA_INFO: &str = "camera_info";
+
+/// Samples that wait for the node: enough for a hiccup, too few to lag behind.
+const INPUT: QosProfile = sensor_data(10);
+/// One second of a 50 Hz camera, for subscribers that acknowledge late.
+const OUTPUT: QosProfile = reliable(50);
+/// As tf2 has it.
+const TRANSFORMS: QosProfile = reliable(100);
+const DIAGNOSTICS: QosProfile = reliable(10);
+
+/// Why the node could not start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NodeError {
+    /// The node's name or a remap.
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    /// A parameter or a parameter file.
+    #[error(transparent)]
+    Parameters(#[from] StartParameterError),
+    /// The marker map's file is missing, or not readable, or not text.
+    #[error(
+        "parameter \"marker_map\": cannot read {path:?}: {source} (a path, or one of the shipped maps: paper, fin6)"
+    )]
+    MapUnreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The marker map cannot be used.
+    #[error("parameter \"marker_map\": {0}")]
+    Map(#[from] MarkerMapError),
+    /// Signals cannot be caught.
+    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
+    Signals(std::io::Error),
+    /// The graph cannot be joined.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// A topic cannot be opened.
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+}
+
+/// Runs the node until SIGINT or SIGTERM, and leaves the graph.
+///
+/// # Errors
+/// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal.
+pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeError> {
+    let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
+    logging::start(arguments, &names);
+    let start = start_values(arguments, &names.fully_qualified())?;
+    let configuration = Configuration::from(&start.parameters);
+    let map = Arc::new(marker_map(&configuration.marker_map)?);
+    // From here on a signal is kept until the loop reads it, and ends the node in good order.
+    let signals = Signals::new([Signal::Int, Signal::Term]).map_err(NodeError::Signals)?;
+
+    let (parameters, changes) = SharedParameters::new(start.parameters);
+    let options = parameters.declare(NodeOptions::new());
+    let mut ros = RosNode::open(NODE_NAME, arguments, environment, options)?;
+    logging::start_rosout(ros.node().logging_handle());
+    for warning in environment.warnings.iter().chain(&start.warnings) {
+        log::warn!("{warning}");
+    }
+    let served = Service::open(&mut ros, &configuration, &map).map(|mut service| {
+        introduce(&ros, environment, &map, configuration.publish_tf);
+        let update = || Configuration::from(&parameters.snapshot()).settings;
+        smol::block_on(service.serve(&ros, signals, changes, update));
+    });
+    if served.is_ok() {
+        log::info!("leaving");
+    }
+    logging::stop_rosout();
+    ros.close();
+    Ok(served?)
+}
+
+/// Returns the shipped map of this name, or the one in the file at this path.
+fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
+    if let Some(map) = MarkerMap::shipped(name) {
+        return Ok(map);
+    }
+    let path = PathBuf::from(name);
+    let text = std::fs::read_to_string(&path)
+        .map_err(|source| NodeError::MapUnreadable { path, source })?;
+    Ok(MarkerMap::from_yaml(&text, name)?)
+}
+
+fn introduce(ros: &RosNode, environment: &Environment, map: &MarkerMap, publish_tf: bool) {
+    let names = ros.names();
+    let topic = |name: &str| names.topic(name).unwrap_or_default();
+    log::info!(
+        "{} in domain {}, marker map {:?} with {} markers",
+        names.fully_qualified(),
+        environment.domain_id,
+        map.name(),
+        map.markers().len(),
+    );
+    log::info!(
+        "listening to {} and {}, publishing {}, {}, {}{}",
+        topic(FEATURE_POINTS),
+        topic(CAMERA_INFO),
+        topic("pose"),
+        topic("status"),
+        topic("/diagnostics"),
+        if publish_tf {
+            format!(", {}", topic("/tf"))
+        } else {
+            String::new()
+        },
+    );
+}
+
+/// The open topics, and the estimator between them.
+struct Service {
+    feature_points: Subscription<FeaturePointArray>,
+    camera_info: Subscription<CameraInfo>,
+    estimator: Estimator,
+}
+
+impl Service {
+    fn open(
+        ros: &mut RosNode,
+        configuration: &Configuration,
+        map: &Arc<MarkerMap>,
+    ) -> Result<Self, EndpointError> {
+        let transform = if configuration.publish_tf {
+            let child = configuration.tanker_frame_id.clone();
+            Some((output(ros, "/tf", &TRANSFORMS)?, child))
+        } else {
+            None
+        };
+        let outputs = Outputs {
+            pose: output(ros, "pose", &OUTPUT)?,
+            status: output(ros, "status", &OUTPUT)?,
+            transform,
+            diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
+        };
+        let pipeline = Pipeline::new(configuration.settings.clone(), Arc::clone(map));
+        Ok(Self {
+            // Inputs last: what arrives can be answered.
+            camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
+            feature_points: ros.subscription(FEATURE_POINTS, &INPUT)?,
+            estimator: Estimator::new(pipeline, outputs, ros.names().base_name(), map.name()),
+        })
+    }
+
+    /// Feeds the estimator until a signal comes.
+    async fn serve(
+        &mut self,
+        ros: &RosNode,
+        signals: Signals,
+        changes: smol::channel::Receiver<()>,
+        update: impl Fn() -> crate::config::Settings,
+    ) {
+        let estimator = &mut self.estimator;
+        let camera_infos = self.camera_info.async_stream();
+        let feature_points = self.feature_points.async_stream();
+        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
+        let (mut signals, changes) = (signals.fuse(), changes.fuse());
+        pin_mut!(camera_infos, feature_points, seconds, changes);
+        loop {
+            // In this order when several are ready: a camera info or a parameter that came before a
+            // frame counts for it.
+            select_biased! {
+                _ = signals.next() => break,
+                () = changes.select_next_some() => estimator.on_settings(update()),
+                sample = camera_infos.select_next_some() => match sample {
+                    Ok((message, _)) => estimator.on_camera_info(&message),
+                    Err(error) => estimator.on_undecodable(CAMERA_INFO, &error),
+                },
+                _ = seconds.select_next_some() => {
+                    let publishers = ros.publisher_count(FEATURE_POINTS).unwrap_or(0);
+                    estimator.on_second(publishers, Instant::now());
+                },
+                sample = feature_points.select_next_some() => match sample {
+                    Ok((message, _)) => estimator.on_feature_points(message),
+                    Err(error) => estimator.on_undecodable(FEATURE_POINTS, &error),
+                },
+            }
+        }
+    }
+}
+
+fn output<M: Message>(
+    ros: &mut RosNode,
+    topic: &str,
+    qos: &QosProfile,
+) -> Result<Output<M>, EndpointError> {
+    let publisher = ros.publisher(topic, qos)?;
+    Ok(Output::new(publisher, ros.names().topic(topic)?))
+}

@@ -1,0 +1,306 @@
+//! A node in the ROS graph: opened from arguments and environment, closed so that others notice.
+//!
+//! ```no_run
+//! use tanker_pose::ros::{arguments::Arguments, environment::Environment, messages::PoseStamped};
+//! use tanker_pose::ros::participant::{NodeOptions, RosNode, reliable};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let environment = Environment::from_process()?;
+//! let mut node = RosNode::open("example", &Arguments::default(), &environment, NodeOptions::new())?;
+//! let publisher = node.publisher::<PoseStamped>("pose", &reliable(10))?;
+//! publisher.publish(PoseStamped::default())?;
+//! drop(publisher); // endpoints go before their node
+//! node.close();
+//! # Ok(())
+//! # }
+//! ```
+
+use std::time::Duration;
+
+use futures::future::{Either, select};
+use futures::pin_mut;
+use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};
+use ros2_client::qos::{Durability, History, WhenFull};
+use ros2_client::{Context, CreateError, CreateResult, MessageTypeName, Node, NodeCreateError};
+pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
+
+use super::arguments::Arguments;
+use super::environment::Environment;
+use super::leave::Farewell;
+use super::messages::Message;
+use super::names::{NamesError, NodeNames};
+
+/// How long the background task may take to end before it is left behind.
+const SPIN_GRACE: Duration = Duration::from_millis(300);
+
+/// Returns the quality of service of inputs: best effort, volatile, the last `depth` samples. It hears best-effort
+/// and reliable publishers alike.
+#[must_use]
+pub const fn sensor_data(depth: usize) -> QosProfile {
+    QosProfile::subscription_default()
+        .reliability_best_effort()
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth })
+}
+
+/// Returns the quality of service of outputs: reliable, volatile, the last `depth` samples. A full window is an
+/// error of `publish` at once: the library's own default would stop the caller for up to 100 ms.
+#[must_use]
+pub const fn reliable(depth: usize) -> QosProfile {
+    QosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Fail)
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth })
+}
+
+/// Why a node could not be opened.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// The node's name or a remap.
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    /// No sockets, no threads, or no interfaces.
+    #[error("cannot join DDS domain {domain_id}: {source}")]
+    Participant {
+        /// The domain.
+        domain_id: u16,
+        /// What the middleware says.
+        source: CreateError,
+    },
+    /// The middleware refused the node's built-in topics.
+    #[error("cannot join the ROS graph: {0}")]
+    Graph(#[from] CreateError),
+    /// The middleware refused the node.
+    #[error("cannot create the node: {0}")]
+    Node(#[from] NodeCreateError),
+}
+
+/// Why an endpoint could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EndpointError {
+    /// The topic's name.
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    /// The middleware refused.
+    #[error("cannot open topic {topic}: {source}")]
+    Create {
+        /// Absolute name of the topic.
+        topic: String,
+        /// What the middleware says.
+        source: CreateError,
+    },
+}
+
+/// A node in the graph, with its background task running.
+///
+/// The fields stand in the order in which they have to be dropped.
+pub struct RosNode {
+    node: Node,
+    spin: smol::Task<CreateResult<()>>,
+    context: Context,
+    names: NodeNames,
+    farewell: Farewell,
+}
+
+impl RosNode {
+    /// Returns a node in the graph, called `default_name` in `/` unless the arguments remap it.
+    ///
+    /// # Errors
+    /// [`OpenError`] when a name is malformed or the middleware cannot start.
+    pub fn open(
+        default_name: &str,
+        arguments: &Arguments,
+        environment: &Environment,
+        options: NodeOptions,
+    ) -> Result<Self, OpenError> {
+        let names = NodeNames::new(default_name, &arguments.remaps)?;
+        let domain_id = environment.domain_id;
+        let mut builder = DomainParticipantBuilder::new(domain_id);
+        if let Some(address) = environment.discovery_range.only_address() {
+            builder = builder.with_only_networks([address]);
+        }
+        let participant = builder.build().map_err(|error| OpenError::Participant {
+            domain_id,
+            source: error.into(),
+        })?;
+        let farewell = Farewell::new(participant.guid().to_bytes(), environment);
+        let context = Context::from_domain_participant(participant)?;
+        let options = options.enable_rosout(arguments.rosout_logs);
+        let mut node = context.new_node(names.client_node()?, options)?;
+        // From here on the graph is watched: waiting for peers without it panics.
+        let spin = smol::spawn(node.spinner()?.spin());
+        Ok(Self {
+            node,
+            spin,
+            context,
+            names,
+            farewell,
+        })
+    }
+
+    /// Returns a publisher on `topic`, its name expanded and remapped.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the name is malformed or the middleware refuses.
+    pub fn publisher<M: Message>(
+        &mut self,
+        topic: &str,
+        qos: &QosProfile,
+    ) -> Result<Publisher<M>, EndpointError> {
+        let name = self.names.client_topic(topic)?;
+        self.node
+            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), qos)
+            .and_then(|topic| self.node.create_publisher(&topic, None))
+            .map_err(|source| EndpointError::Create {
+                topic: name.to_string(),
+                source,
+            })
+    }
+
+    /// Returns a subscription to `topic`, its name expanded and remapped.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the name is malformed or the middleware refuses.
+    pub fn subscription<M: Message>(
+        &mut self,
+        topic: &str,
+        qos: &QosProfile,
+    ) -> Result<Subscription<M>, EndpointError> {
+        let name = self.names.client_topic(topic)?;
+        self.node
+            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), qos)
+            .and_then(|topic| self.node.create_subscription(&topic, None))
+            .map_err(|source| EndpointError::Create {
+                topic: name.to_string(),
+                source,
+            })
+    }
+
+    /// The client library's node, for waits, counts and logging.
+    #[must_use]
+    pub const fn node(&self) -> &Node {
+        &self.node
+    }
+
+    /// The node's names.
+    #[must_use]
+    pub const fn names(&self) -> &NodeNames {
+        &self.names
+    }
+
+    /// Returns how many publishers the graph has on `topic`, its name expanded and remapped.
+    ///
+    /// # Errors
+    /// [`NamesError`] when the name is malformed.
+    pub fn publisher_count(&self, topic: &str) -> Result<usize, NamesError> {
+        Ok(self.node.publisher_count(&self.names.topic(topic)?))
+    }
+
+    /// Returns how many subscriptions the graph has on `topic`, its name expanded and remapped.
+    ///
+    /// # Errors
+    /// [`NamesError`] when the name is malformed.
+    pub fn subscription_count(&self, topic: &str) -> Result<usize, NamesError> {
+        Ok(self.node.subscription_count(&self.names.topic(topic)?))
+    }
+
+    /// Leaves the graph and tells the others. Publishers and subscriptions must be dropped before.
+    pub fn close(self) {
+        let Self {
+            node,
+            spin,
+            context,
+            farewell,
+            ..
+        } = self;
+        drop(node); // ends the background task, which holds a handle to the context
+        smol::block_on(async {
+            let timeout = smol::Timer::after(SPIN_GRACE);
+            pin_mut!(spin);
+            match select(spin, timeout).await {
+                Either::Left((Ok(()), _)) => {}
+                Either::Left((Err(error), _)) => log::debug!("the background task failed: {error}"),
+                Either::Right(_) => log::debug!("the background task did not end in time"),
+            }
+        });
+        drop(context);
+        farewell.send();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::environment::DiscoveryRange;
+    use super::super::messages::{Header, PoseStamped, Time};
+    use super::*;
+
+    /// Discovery on one host takes a fraction of a second; a loaded machine may take several.
+    const PATIENCE: Duration = Duration::from_secs(20);
+
+    /// A domain of this test run's own, among those whose ports are not handed out to clients.
+    fn environment() -> Environment {
+        Environment {
+            domain_id: 60 + u16::try_from(std::process::id() % 40).expect("below 40"),
+            discovery_range: DiscoveryRange::Localhost,
+            warnings: Vec::new(),
+        }
+    }
+
+    fn open(name: &str) -> RosNode {
+        let options = NodeOptions::new();
+        RosNode::open(name, &Arguments::default(), &environment(), options)
+            .expect("loopback exists")
+    }
+
+    async fn within<T>(patience: Duration, future: impl Future<Output = T>) -> Option<T> {
+        pin_mut!(future);
+        match select(future, smol::Timer::after(patience)).await {
+            Either::Left((value, _)) => Some(value),
+            Either::Right(_) => None,
+        }
+    }
+
+    #[test]
+    fn message_passes_between_two_nodes_of_this_host_bit_for_bit() {
+        let (mut sender, mut receiver) = (open("sender"), open("receiver"));
+        let subscription = receiver
+            .subscription::<PoseStamped>("~/pose", &sensor_data(10))
+            .expect("the name is valid");
+        let publisher = sender
+            .publisher::<PoseStamped>("/receiver/pose", &reliable(10))
+            .expect("the name is valid");
+        let sent = PoseStamped {
+            header: Header {
+                stamp: Time {
+                    sec: -1,
+                    nanosec: 999_999_999,
+                },
+                frame_id: "camera".to_owned(),
+            },
+            ..PoseStamped::default()
+        };
+
+        let received = smol::block_on(async {
+            within(PATIENCE, publisher.wait_for_subscription(sender.node())).await?;
+            // Matched on this side may be a little before matched on the other, and best effort
+            // does not repeat.
+            for _ in 0..200 {
+                publisher
+                    .publish(sent.clone())
+                    .expect("a window of ten has room");
+                let pace = Duration::from_millis(100);
+                if let Some(sample) = within(pace, subscription.async_take()).await {
+                    return Some(sample.expect("the sample is well formed").0);
+                }
+            }
+            None
+        });
+
+        assert_eq!(received, Some(sent));
+        drop((publisher, subscription));
+        sender.close();
+        receiver.close();
+    }
+}

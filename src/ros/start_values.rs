@@ -1,0 +1,220 @@
+//! Parameters at the start: defaults, then files, then arguments.
+
+use std::path::PathBuf;
+
+use ros2args::ParamAssignment;
+
+use super::arguments::Arguments;
+use super::parameter_file::{self, ParameterFileError};
+use crate::config::{ParameterError, ParameterValue, Parameters};
+
+/// Why the parameters given at the start cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StartParameterError {
+    /// A file.
+    #[error(transparent)]
+    File(#[from] ParameterFileError),
+    /// A value in a file.
+    #[error("parameter file {path:?}, line {line}: {source}")]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
+        /// What is wrong.
+        source: ParameterError,
+    },
+    /// A value of `-p`.
+    #[error("argument -p: {0}")]
+    InArgument(ParameterError),
+    /// A list, a map, or nothing where a value belongs.
+    #[error("{place}: parameter {name:?} needs a bool, a number or text")]
+    NoScalar {
+        /// File and line, or the argument.
+        place: String,
+        /// The parameter.
+        name: String,
+    },
+}
+
+/// What [`start_values`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartValues {
+    /// A value for every parameter.
+    pub parameters: Parameters,
+    /// What is allowed, but perhaps not meant.
+    pub warnings: Vec<String>,
+}
+
+/// Returns the parameters of the node with this absolute name: defaults, overridden by the files in
+/// their order, overridden by `-p`.
+///
+/// # Errors
+/// [`StartParameterError`] names the parameter, and the file and line that it stands in.
+pub fn start_values(arguments: &Arguments, node: &str) -> Result<StartValues, StartParameterError> {
+    let mut parameters = Parameters::default();
+    let mut warnings = Vec::new();
+    for path in &arguments.parameter_files {
+        let Some(section) = parameter_file::read(path, node)? else {
+            warnings.push(format!(
+                "parameter file {} has no section for {node}",
+                path.display()
+            ));
+            continue;
+        };
+        for parameter in section
+            .into_iter()
+            .filter(|parameter| !is_foreign(&parameter.name))
+        {
+            let line = parameter.line;
+            let Some(value) = parameter.value else {
+                let place = format!("parameter file {}, line {line}", path.display());
+                return Err(StartParameterError::NoScalar {
+                    place,
+                    name: parameter.name,
+                });
+            };
+            parameters.set(&parameter.name, value).map_err(|source| {
+                StartParameterError::InFile {
+                    path: path.clone(),
+                    line,
+                    source,
+                }
+            })?;
+        }
+    }
+    let base_name = ros2args::extract_base_name(node);
+    for assignment in &arguments.parameters {
+        let applies = assignment.applies_to_node(base_name) || assignment.applies_to_node(node);
+        if !applies || is_foreign(&assignment.name) {
+            continue;
+        }
+        let value = scalar(assignment).ok_or_else(|| StartParameterError::NoScalar {
+            place: "argument -p".to_owned(),
+            name: assignment.name.clone(),
+        })?;
+        parameters
+            .set(&assignment.name, value)
+            .map_err(StartParameterError::InArgument)?;
+    }
+    Ok(StartValues {
+        parameters,
+        warnings,
+    })
+}
+
+/// ROS has parameters of its own for quality of service: launch files may carry them, and nothing
+/// here reads them.
+fn is_foreign(name: &str) -> bool {
+    name.starts_with("qos_overrides.")
+}
+
+fn scalar(assignment: &ParamAssignment) -> Option<ParameterValue> {
+    assignment
+        .as_bool()
+        .map(ParameterValue::Bool)
+        .or_else(|| assignment.as_i64().map(ParameterValue::Integer))
+        .or_else(|| assignment.as_f64().map(ParameterValue::Double))
+        .or_else(|| {
+            assignment
+                .as_str()
+                .map(|text| ParameterValue::String(text.to_owned()))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::TABLE;
+
+    fn arguments(arguments: &[&str]) -> Arguments {
+        let all: Vec<String> = ["--ros-args"]
+            .iter()
+            .chain(arguments)
+            .map(|&text| text.to_owned())
+            .collect();
+        Arguments::split(&all)
+            .expect("the test's arguments are well formed")
+            .0
+    }
+
+    fn shipped_file() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("config/tanker_pose.yaml")
+    }
+
+    #[test]
+    fn shipped_parameter_file_lists_the_table_and_its_defaults() {
+        let section = parameter_file::read(&shipped_file(), "/tanker_pose")
+            .expect("the shipped file is valid")
+            .expect("the shipped file is for every node");
+        let mut listed: Vec<&str> = section.iter().map(|p| p.name.as_str()).collect();
+        listed.sort_unstable();
+        let mut table: Vec<&str> = TABLE.iter().map(|spec| spec.name).collect();
+        table.sort_unstable();
+        assert_eq!(listed, table);
+        for parameter in &section {
+            let spec = TABLE
+                .iter()
+                .find(|spec| spec.name == parameter.name)
+                .expect("just compared");
+            assert_eq!(parameter.value, Some(spec.default()), "{}", parameter.name);
+        }
+    }
+
+    #[test]
+    fn arguments_override_files_and_files_override_defaults() {
+        let path = shipped_file();
+        let path = path.to_str().expect("the path is text");
+        let given = arguments(&[
+            "-p",
+            "max_outliers:=1",
+            "--params-file",
+            path,
+            "-p",
+            "pixel_sigma_px:=1",
+        ]);
+        let found = start_values(&given, "/uav1/tanker_pose")
+            .expect("valid")
+            .parameters;
+        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
+        assert_eq!(
+            found.get("pixel_sigma_px"),
+            Some(&ParameterValue::Double(1.0))
+        );
+        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(4)));
+    }
+
+    #[test]
+    fn argument_for_another_node_and_qos_overrides_are_passed_over() {
+        let given = arguments(&[
+            "-p",
+            "other:max_outliers:=1",
+            "-p",
+            "tanker_pose:min_points:=6",
+            "-p",
+            "qos_overrides./pose.publisher.depth:=1",
+        ]);
+        let found = start_values(&given, "/tanker_pose")
+            .expect("valid")
+            .parameters;
+        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(2)));
+        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(6)));
+    }
+
+    #[test]
+    fn wrong_arguments_are_refused_by_name() {
+        for (argument, name) in [
+            ("max_outlier:=1", "max_outliers"),
+            ("max_outliers:=3", "max_outliers"),
+            ("max_outliers:=[1]", "max_outliers"),
+            ("pixel_sigma_px:=.nan", "pixel_sigma_px"),
+            ("rectified:=~", "rectified"),
+        ] {
+            let refused = start_values(&arguments(&["-p", argument]), "/n").expect_err(argument);
+            assert!(refused.to_string().contains(name), "{argument}: {refused}");
+        }
+    }
+}
