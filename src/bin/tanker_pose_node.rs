@@ -1,5 +1,6 @@
 //! The ROS 2 node: reads its command line and environment, and runs until a signal.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use tanker_pose::ros::arguments::{Command, HELP};
@@ -20,12 +21,10 @@ fn main() -> ExitCode {
     let arguments = match Command::parse(&arguments) {
         Ok(Command::Run(arguments)) => arguments,
         Ok(Command::Help) => {
-            print!("{HELP}");
-            return ExitCode::SUCCESS;
+            return say(HELP.trim_end());
         }
         Ok(Command::Version) => {
-            println!("tanker_pose_node {}", env!("CARGO_PKG_VERSION"));
-            return ExitCode::SUCCESS;
+            return say(concat!("tanker_pose_node ", env!("CARGO_PKG_VERSION")));
         }
         Err(error) => return fail(&format!("{error} (see --help)"), USAGE),
     };
@@ -39,7 +38,14 @@ fn main() -> ExitCode {
     }
 }
 
+// A closed pipe at the other end is no reason to panic, as `println!` and `eprintln!` would.
+
+fn say(text: &str) -> ExitCode {
+    let _ = writeln!(std::io::stdout(), "{text}");
+    ExitCode::SUCCESS
+}
+
 fn fail(message: &str, code: u8) -> ExitCode {
-    eprintln!("tanker_pose_node: {message}");
+    let _ = writeln!(std::io::stderr(), "tanker_pose_node: {message}");
     ExitCode::from(code)
 }

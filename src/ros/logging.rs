@@ -15,11 +15,14 @@ use ros2_client::{NodeLoggingHandle, RosoutRaw};
 use super::arguments::Arguments;
 use super::names::NodeNames;
 
-/// This package's own lines from info on. The middleware's from error on: it warns of every packet
-/// that is not its own.
-const DEFAULT_FILTER: &str = "info,rustdds=error,ros2_client=error";
-/// The crates whose lines never go to /rosout: publishing them would bring forth more of them.
-const MIDDLEWARE: [&str; 2] = ["rustdds", "ros2_client"];
+/// This package's own lines from info on; other crates' from warnings on, but the middleware's from
+/// errors on: it warns of every packet and every string that is not as it should be, which here is
+/// counted, and said once.
+const DEFAULT_FILTER: &str =
+    "warn,tanker_pose=info,rustdds=error,ros2_client=error,cdr_encoding=error";
+/// The crates of this package, library and programs, by the beginning of their names. Only their
+/// lines go to /rosout: publishing those of the middleware would bring forth more of them.
+const OWN: &str = "tanker_pose";
 /// Where the client library repeats what it published to /rosout.
 const ECHO: &str = "ros2_client::rosout";
 /// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
@@ -46,7 +49,7 @@ pub fn start(arguments: &Arguments, names: &NodeNames) {
     }
     for (logger, level) in &arguments.log_levels {
         match logger {
-            None => builder.filter(None, *level),
+            None => builder.filter(Some(OWN), *level),
             Some(logger) => builder.filter(Some(&module(logger, &name, names)), *level),
         };
     }
@@ -98,10 +101,10 @@ fn logger_name(names: &NodeNames) -> String {
         .replace('/', ".")
 }
 
-/// The node's own logger is this crate; any other is named as its crate is.
+/// The node's own logger is this package; any other is named as its crate is.
 fn module(logger: &str, own: &str, names: &NodeNames) -> String {
     if logger == own || logger == names.base_name() {
-        env!("CARGO_CRATE_NAME").to_owned()
+        OWN.to_owned()
     } else {
         logger.replace('.', "::")
     }
@@ -117,10 +120,10 @@ fn write_line(
         .unwrap_or_default();
     let (sec, nanosec) = (since_epoch.as_secs(), since_epoch.subsec_nanos());
     let style = out.default_level_style(record.level());
-    let who = if is_middleware(record.target()) {
-        record.target()
-    } else {
+    let who = if is_own(record.target()) {
         name
+    } else {
+        record.target()
     };
     writeln!(
         out,
@@ -130,12 +133,8 @@ fn write_line(
     )
 }
 
-fn is_middleware(target: &str) -> bool {
-    MIDDLEWARE.iter().any(|name| {
-        target
-            .strip_prefix(name)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
-    })
+fn is_own(target: &str) -> bool {
+    target.starts_with(OWN)
 }
 
 impl Log for NodeLog {
@@ -154,7 +153,7 @@ impl Log for NodeLog {
         if self.console_on {
             self.console.log(record);
         }
-        if is_middleware(record.target()) {
+        if !is_own(record.target()) {
             return;
         }
         let rosout = self.rosout.read().unwrap_or_else(PoisonError::into_inner);
@@ -192,14 +191,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn middleware_is_known_by_its_crate_and_not_by_a_prefix_of_letters() {
-        assert!(is_middleware("rustdds::rtps::reader"));
-        assert!(is_middleware("ros2_client"));
-        assert!(!is_middleware("rustdds_tools"));
-        assert!(!is_middleware("tanker_pose::ros::node"));
-    }
-
-    #[test]
     fn loggers_are_named_as_in_ros() {
         let names = NodeNames::new("tanker_pose", &[]).expect("the default name is valid");
         assert_eq!(logger_name(&names), "tanker_pose");
@@ -214,13 +205,15 @@ mod tests {
     fn default_filter_keeps_own_lines_and_quietens_the_middleware() {
         let mut builder = env_logger::Builder::new();
         builder.parse_filters(DEFAULT_FILTER);
-        builder.filter(None, LevelFilter::Debug); // as --log-level debug does
+        builder.filter(Some(OWN), LevelFilter::Debug); // as --log-level debug does
         let logger = builder.build();
         let enabled = |target: &str, level| {
             logger.enabled(&Metadata::builder().target(target).level(level).build())
         };
         assert!(enabled("tanker_pose::ros::node", Level::Debug));
+        assert!(enabled("tanker_pose_node", Level::Debug));
         assert!(!enabled("rustdds::rtps", Level::Warn));
+        assert!(!enabled("polling", Level::Info));
         assert!(enabled("rustdds::rtps", Level::Error));
     }
 }

@@ -53,6 +53,15 @@ pub const fn reliable(depth: usize) -> QosProfile {
         .history(History::KeepLast { depth })
 }
 
+/// Returns what the future gives, or none if that takes longer than `patience`.
+pub async fn within<T>(patience: Duration, future: impl Future<Output = T>) -> Option<T> {
+    pin_mut!(future);
+    match select(future, smol::Timer::after(patience)).await {
+        Either::Left((value, _)) => Some(value),
+        Either::Right(_) => None,
+    }
+}
+
 /// Why a node could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -73,7 +82,19 @@ pub enum OpenError {
     Graph(#[from] CreateError),
     /// The middleware refused the node.
     #[error("cannot create the node: {0}")]
-    Node(#[from] NodeCreateError),
+    Node(CreateError),
+    /// The middleware refused a parameter's first value.
+    #[error("cannot declare the parameters: {0}")]
+    Parameter(String),
+}
+
+impl From<NodeCreateError> for OpenError {
+    fn from(error: NodeCreateError) -> Self {
+        match error {
+            NodeCreateError::DDS(error) => Self::Node(error),
+            NodeCreateError::BadParameter(reason) => Self::Parameter(reason),
+        }
+    }
 }
 
 /// Why an endpoint could not be made.
@@ -216,15 +237,11 @@ impl RosNode {
             ..
         } = self;
         drop(node); // ends the background task, which holds a handle to the context
-        smol::block_on(async {
-            let timeout = smol::Timer::after(SPIN_GRACE);
-            pin_mut!(spin);
-            match select(spin, timeout).await {
-                Either::Left((Ok(()), _)) => {}
-                Either::Left((Err(error), _)) => log::debug!("the background task failed: {error}"),
-                Either::Right(_) => log::debug!("the background task did not end in time"),
-            }
-        });
+        match smol::block_on(within(SPIN_GRACE, spin)) {
+            Some(Ok(())) => {}
+            Some(Err(error)) => log::debug!("the background task failed: {error}"),
+            None => log::debug!("the background task did not end in time"),
+        }
         drop(context);
         farewell.send();
     }
@@ -252,14 +269,6 @@ mod tests {
         let options = NodeOptions::new();
         RosNode::open(name, &Arguments::default(), &environment(), options)
             .expect("loopback exists")
-    }
-
-    async fn within<T>(patience: Duration, future: impl Future<Output = T>) -> Option<T> {
-        pin_mut!(future);
-        match select(future, smol::Timer::after(patience)).await {
-            Either::Left((value, _)) => Some(value),
-            Either::Right(_) => None,
-        }
     }
 
     #[test]
