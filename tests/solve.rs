@@ -81,7 +81,8 @@ fn a_hundred_thousand_frames_through_one_process_are_consistent() {
             frame(id, &scene.noisy_observations(0.5, &mut random)).to_string()
         })
         .collect();
-    let answers = solve(&[], lines);
+    // Without exclusion, so that the share of trusted frames is that of the chi-squared test.
+    let answers = solve(&["--max-outliers", "0"], lines);
     assert_eq!(answers.len(), FRAMES);
     let (mut trusted, mut nees_sum) = (0, 0.0);
     for (id, (answer, truth)) in answers.iter().zip(&truths).enumerate() {
@@ -189,7 +190,10 @@ fn malformed_lines_are_answered_in_place_and_the_rest_is_solved() {
             "got 0",
         ),
         (
-            changed(&|v| v["points"][0]["u"] = json!(300.0)),
+            changed(&|v| {
+                v["points"][0]["u"] = json!(300.0);
+                v["points"][3]["u"] = json!(20.0);
+            }),
             "not_trusted",
             "chi-squared",
         ),
@@ -254,4 +258,19 @@ fn every_option_of_the_contract_is_taken() {
             );
         }
     }
+}
+
+#[test]
+fn a_wrong_point_is_left_out_and_named() {
+    let mut random = ChaCha8Rng::seed_from_u64(43);
+    let scene = random_refuelling_scene(&mut random, 15.0, 16.0);
+    let mut seen = scene.noisy_observations(0.5, &mut random);
+    seen[2].pixel.u += 40.0;
+    let line = frame(1, &seen).to_string();
+    let answer = &solve(&["--max-outliers", "1"], vec![line.clone()])[0];
+    assert_eq!(answer["outcome"], "ok", "{answer}");
+    assert_eq!(answer["rejected_ids"], json!([3]));
+    assert_eq!(answer["used_ids"], json!([1, 2, 4, 5, 6]));
+    let answer = &solve(&["--max-outliers", "0"], vec![line])[0];
+    assert_eq!(answer["outcome"], "not_trusted", "{answer}");
 }

@@ -177,12 +177,12 @@ pub const TABLE: &[ParameterSpec] = &[
     ParameterSpec {
         name: "max_outliers",
         kind: Kind::Integer {
-            default: 2,
+            default: 1,
             min: 0,
             max: 2,
         },
         read_only: false,
-        description: "how many detections may be excluded from a frame as wrong",
+        description: "how many detections may be excluded from a frame as wrong; two of six leave little to judge the rest by",
     },
     ParameterSpec {
         name: "min_points",

@@ -1,11 +1,11 @@
 //! The one call that turns observations into a judged pose.
 
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, UnitQuaternion};
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::collinearity::CollinearityCost;
 use super::exclude;
-use super::initialise::{front_minima, linear_rotation};
+use super::initialise::{self, linear_rotation};
 use super::problem::Problem;
 use super::refine::Fit;
 use super::trust::TrustLimits;
@@ -17,6 +17,9 @@ use crate::geometry::PoseCovariance;
 
 /// rad; a subset that has turned farther from its prior has found a way to fit noise, not the tanker.
 const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// rad; spread of the attitude about its prior: refuelling keeps the relative angles within ±5°.
+const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// Settings with what can be computed once: the limits of the chi-squared test.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,10 +77,11 @@ impl Estimator {
             return of_all;
         }
         let suspects = suspects(camera, observations, of_all.as_ref().ok());
-        let near_prior = |points: &[Observation]| {
-            solver(points).and_then(|solution| self.check_turn(solution, previous))
+        let judge = exclude::Judge {
+            solve: solver,
+            prior_cost: |solution: &Solution| self.prior_cost(solution, previous),
         };
-        exclude::search(&near_prior, observations, &suspects, max_outliers).map_or(of_all, Ok)
+        exclude::search(&judge, observations, &suspects, max_outliers).map_or(of_all, Ok)
     }
 
     /// Returns the pose of all these points, or the reason for none.
@@ -121,29 +125,24 @@ impl Estimator {
         }
     }
 
-    /// Lets a hypothesis about wrong points pass only near the prior that it started from.
-    fn check_turn(
-        &self,
-        solution: Solution,
-        previous: Option<&Rotation3<f64>>,
-    ) -> Result<Solution, EstimateError> {
+    /// Returns what the prior holds against a hypothesis about wrong points: the squared turn from
+    /// the attitude it started from, in units of [`PRIOR_SIGMA`]; infinite beyond
+    /// [`MAX_TURN_FROM_PRIOR`], nothing for starts that have no prior.
+    fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {
         let prior = match solution.initialisation {
             Initialisation::Nominal => Some(&self.settings.nominal_camera_from_tanker),
             Initialisation::Previous => previous,
             Initialisation::Dlt | Initialisation::Global => None,
         };
         let found = solution.camera_from_tanker.rotation.to_rotation_matrix();
-        // The trace and not the angle, whose arc cosine is not a number for equal rotations.
-        let is_far = prior.is_some_and(|prior| {
-            (prior.matrix().dot(found.matrix()) - 1.0) * 0.5 < MAX_TURN_FROM_PRIOR.cos()
-        });
-        if is_far {
-            Err(EstimateError::NoConvergence {
-                iterations: solution.iterations,
-            })
-        } else {
-            Ok(solution)
-        }
+        prior.map_or(0.0, |prior| {
+            let turn = UnitQuaternion::from_rotation_matrix(&(found * prior.inverse())).angle();
+            if turn > MAX_TURN_FROM_PRIOR {
+                f64::INFINITY
+            } else {
+                (turn / PRIOR_SIGMA).powi(2)
+            }
+        })
     }
 
     fn solve_from(
@@ -238,10 +237,15 @@ fn globally(
     observations: &[Observation],
     cost: &CollinearityCost,
 ) -> Result<Candidate, EstimateError> {
-    let (minima, mut iterations) = front_minima(cost, problem.step_tolerance());
+    let minima = initialise::search(cost, problem.step_tolerance());
+    let mut iterations = minima.iterations;
     let mut best: Option<(Fit, f64)> = None;
     let mut rival_merit: Option<(Fit, f64)> = None;
-    let mut failure = EstimateError::NoConvergence { iterations };
+    // With every minimum behind the camera, that is the reason.
+    let mut failure = minima
+        .behind
+        .and_then(|minimum| problem.fit(observations, cost, &minimum.rotation).err())
+        .unwrap_or(EstimateError::NoConvergence { iterations });
     let mut consider = |fit: Fit, merit: f64| match &best {
         Some((known, _)) if is_same(&known.pose.rotation, &fit.pose.rotation) => {}
         Some((_, best_merit)) if *best_merit <= merit => {
@@ -254,7 +258,7 @@ fn globally(
             best = Some((fit, merit));
         }
     };
-    for minimum in minima.iter().flatten() {
+    for minimum in minima.in_front.iter().flatten() {
         match problem.fit(observations, cost, &minimum.rotation) {
             Ok(fit) => {
                 iterations = iterations.saturating_add(fit.iterations);

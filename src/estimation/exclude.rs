@@ -20,15 +20,27 @@ const MIN_REMAINING: usize = 4;
 /// of their points in common is so far apart.
 const ELSEWHERE: f64 = 30.0;
 
-/// How a set of points is solved and judged.
-pub(crate) trait Solve {
-    /// The pose of these points, judged.
-    fn solve(&self, observations: &[Observation]) -> Result<Solution, EstimateError>;
+/// How the points of a hypothesis are solved, and how hypotheses are ranked.
+pub(crate) struct Judge<S, P> {
+    /// The pose of some points, judged.
+    pub(crate) solve: S,
+    /// What the prior holds against a pose: a squared distance in sigmas, added to chi-squared.
+    pub(crate) prior_cost: P,
 }
 
-impl<F: Fn(&[Observation]) -> Result<Solution, EstimateError>> Solve for F {
-    fn solve(&self, observations: &[Observation]) -> Result<Solution, EstimateError> {
-        self(observations)
+impl<S, P> Judge<S, P>
+where
+    S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
+    P: Fn(&Solution) -> f64,
+{
+    fn trusted(&self, observations: &[Observation]) -> Option<Solution> {
+        (self.solve)(observations)
+            .ok()
+            .filter(|solution| solution.is_trusted() && self.cost(solution).is_finite())
+    }
+
+    fn cost(&self, solution: &Solution) -> f64 {
+        solution.chi_squared + (self.prior_cost)(solution)
     }
 }
 
@@ -36,17 +48,21 @@ impl<F: Fn(&[Observation]) -> Result<Solution, EstimateError>> Solve for F {
 /// no hypothesis passes.
 ///
 /// `suspects` are indices of the points that may be left out.
-pub(crate) fn search(
-    solver: &impl Solve,
+pub(crate) fn search<S, P>(
+    judge: &Judge<S, P>,
     observations: &[Observation],
     suspects: &[usize],
     max_outliers: usize,
-) -> Option<Solution> {
+) -> Option<Solution>
+where
+    S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
+    P: Fn(&Solution) -> f64,
+{
     let spare = observations.len().saturating_sub(MIN_REMAINING);
     let mut scratch = Vec::with_capacity(observations.len());
     if max_outliers >= 1 && spare >= 1 {
         let singles = suspects.iter().map(|&i| [i, i]);
-        let solution = best(solver, observations, &mut scratch, singles);
+        let solution = best(judge, observations, &mut scratch, singles);
         if solution.is_some() {
             return solution;
         }
@@ -68,27 +84,31 @@ pub(crate) fn search(
             (scratch[i].pixel, scratch[j].pixel) = (observations[j].pixel, observations[i].pixel);
             (scratch[i].sigma_px, scratch[j].sigma_px) =
                 (observations[j].sigma_px, observations[i].sigma_px);
-            let solution = solver.solve(&scratch).ok().filter(Solution::is_trusted)?;
-            Some((solution.chi_squared, pair))
+            let solution = judge.trusted(&scratch)?;
+            Some((judge.cost(&solution), pair))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((_, pair)) = exchange {
-        let without_pair = best(solver, observations, &mut scratch, std::iter::once(pair));
+        let without_pair = best(judge, observations, &mut scratch, std::iter::once(pair));
         if without_pair.is_some() {
             return without_pair;
         }
     }
-    best(solver, observations, &mut scratch, pairs())
+    best(judge, observations, &mut scratch, pairs())
 }
 
-/// The trusted solution with the least chi-squared among those that leave out one of these pairs
+/// The trusted solution with the least cost among those that leave out one of these pairs
 /// (the same index twice: one point). Another one that says something else is its rival.
-fn best(
-    solver: &impl Solve,
+fn best<S, P>(
+    judge: &Judge<S, P>,
     observations: &[Observation],
     scratch: &mut Vec<Observation>,
     left_out: impl Iterator<Item = [usize; 2]>,
-) -> Option<Solution> {
+) -> Option<Solution>
+where
+    S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
+    P: Fn(&Solution) -> f64,
+{
     let mut trusted: Vec<Solution> = left_out
         .filter_map(|[i, j]| {
             scratch.clear();
@@ -97,17 +117,17 @@ fn best(
                 .enumerate()
                 .filter(|(k, _)| *k != i && *k != j);
             scratch.extend(remaining.map(|(_, seen)| *seen));
-            let mut solution = solver.solve(scratch).ok().filter(Solution::is_trusted)?;
+            let mut solution = judge.trusted(scratch)?;
             let second = (j != i).then(|| observations[j].id);
             solution.excluded = Excluded([Some(observations[i].id), second]);
             Some(solution)
         })
         .collect();
-    trusted.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
+    trusted.sort_by(|a, b| judge.cost(a).total_cmp(&judge.cost(b)));
     let mut trusted = trusted.into_iter();
     let mut best = trusted.next()?;
     if let Some(rival) = trusted.find(|other| is_elsewhere(&best, other)) {
-        let ratio = likelihood_ratio(rival.chi_squared, best.chi_squared);
+        let ratio = likelihood_ratio(judge.cost(&rival), judge.cost(&best));
         best.ambiguity = best.ambiguity.max(ratio);
     }
     Some(best)

@@ -191,7 +191,7 @@ mod tests {
     fn argument_for_another_node_and_qos_overrides_are_passed_over() {
         let given = arguments(&[
             "-p",
-            "other:max_outliers:=1",
+            "other:max_outliers:=2",
             "-p",
             "tanker_pose:min_points:=6",
             "-p",
@@ -200,7 +200,7 @@ mod tests {
         let found = start_values(&given, "/tanker_pose")
             .expect("valid")
             .parameters;
-        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(2)));
+        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
         assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(6)));
     }
 

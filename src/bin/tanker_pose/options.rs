@@ -18,11 +18,14 @@ pub struct EstimatorOptions {
     #[arg(long, value_enum, default_value_t = Estimate::MaximumLikelihood)]
     refinement: Estimate,
     /// Standard deviation of pixels that bring none, px
-    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = in_range::<1, 1_000_000>)]
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = sigma_px)]
     pub pixel_sigma_px: f64,
     /// Fewer points than this give no pose
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(3..))]
     min_points: u16,
+    /// At most this many points of a frame may be left out as wrong
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
+    max_outliers: u8,
     /// Probability with which a correct frame passes the chi-squared test
     #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
     trust_probability: f64,
@@ -98,9 +101,9 @@ impl EstimatorOptions {
                     self.nominal_yaw_deg.to_radians(),
                 ),
             min_points: usize::from(self.min_points),
+            max_outliers: usize::from(self.max_outliers),
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
-            ..EstimatorSettings::default()
         }
     }
 }
@@ -116,10 +119,8 @@ pub fn marker_map(name_or_path: &str) -> Result<MarkerMap, String> {
     MarkerMap::from_yaml(&text, name_or_path).map_err(|error| error.to_string())
 }
 
-/// Between 0.001 and 1000 by default generics: bounds in thousandths, because a generic cannot be a float.
-fn in_range<const MIN_MILLI: i64, const MAX_MILLI: i64>(text: &str) -> Result<f64, String> {
-    let (min, max) = (MIN_MILLI as f64 * 1e-3, MAX_MILLI as f64 * 1e-3);
-    number(text, min, max)
+fn sigma_px(text: &str) -> Result<f64, String> {
+    number(text, 1e-3, 1e3)
 }
 
 fn probability(text: &str) -> Result<f64, String> {

@@ -18,13 +18,18 @@ const SAME_MINIMUM: f64 = 0.02;
 
 static ICOSAHEDRAL_GROUP: LazyLock<[Rotation3<f64>; GROUP_SIZE]> = LazyLock::new(icosahedral_group);
 
-/// Returns the minima of the cost with the markers' mean in front of the camera, best first.
-///
-/// The search ranks the sixty rotations of the icosahedral group by cost and descends from the best.
-pub(crate) fn front_minima(
-    cost: &CollinearityCost,
-    step_tolerance: f64,
-) -> ([Option<Minimum>; MAX_MINIMA], u16) {
+/// What the search found.
+pub(crate) struct Minima {
+    /// Minima with the markers' mean in front of the camera, best first.
+    pub(crate) in_front: [Option<Minimum>; MAX_MINIMA],
+    /// The best minimum behind the camera, for saying why there is none in front.
+    pub(crate) behind: Option<Minimum>,
+    /// Of all descents together.
+    pub(crate) iterations: u16,
+}
+
+/// Returns the minima of the cost that descents from the best of sixty rotations end in.
+pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
     // The best few starts, by insertion: no allocation, and sixty entries need no better sort.
     let mut starts = [(f64::INFINITY, 0_usize); DESCENTS];
     for (index, rotation) in ICOSAHEDRAL_GROUP.iter().enumerate() {
@@ -33,27 +38,41 @@ pub(crate) fn front_minima(
             insert(&mut starts, (cost.value(rotation), index), |a, b| a.0 < b.0);
         }
     }
-    let mut minima = [None; MAX_MINIMA];
-    let mut iterations = 0_u16;
+    let mut found = Minima {
+        in_front: [None; MAX_MINIMA],
+        behind: None,
+        iterations: 0,
+    };
     for (value, index) in starts {
         if value.is_infinite() {
             break;
         }
         let minimum = newton::minimise(cost, &ICOSAHEDRAL_GROUP[index], step_tolerance);
-        iterations = iterations.saturating_add(minimum.iterations);
-        let in_front = cost.centre_in_camera(&minimum.rotation).z > 0.0;
-        let known = minima.iter().flatten().any(|other: &Minimum| {
-            (other.rotation.matrix() - minimum.rotation.matrix()).norm() < SAME_MINIMUM
-        });
-        if minimum.converged && in_front && !known {
-            insert(&mut minima, Some(minimum), |a, b| match (a, b) {
-                (Some(a), Some(b)) => a.cost < b.cost,
-                (Some(_), None) => true,
-                (None, _) => false,
-            });
+        found.iterations = found.iterations.saturating_add(minimum.iterations);
+        if minimum.converged {
+            found.keep(minimum, cost.centre_in_camera(&minimum.rotation).z > 0.0);
         }
     }
-    (minima, iterations)
+    found
+}
+
+impl Minima {
+    fn keep(&mut self, minimum: Minimum, is_in_front: bool) {
+        let is_better = |new: &Option<Minimum>, old: &Option<Minimum>| match (new, old) {
+            (Some(new), Some(old)) => new.cost < old.cost,
+            (new, _) => new.is_some(),
+        };
+        let is_known = self.in_front.iter().flatten().any(|other| {
+            (other.rotation.matrix() - minimum.rotation.matrix()).norm() < SAME_MINIMUM
+        });
+        if !is_in_front {
+            if is_better(&Some(minimum), &self.behind) {
+                self.behind = Some(minimum);
+            }
+        } else if !is_known {
+            insert(&mut self.in_front, Some(minimum), is_better);
+        }
+    }
 }
 
 /// Puts `item` at its place in a sorted array and lets the last one drop off.

@@ -6,4 +6,4 @@ mod dlt;
 mod global;
 
 pub use dlt::linear_rotation;
-pub(crate) use global::front_minima;
+pub(crate) use global::search;
