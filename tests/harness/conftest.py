@@ -1,0 +1,93 @@
+"""What every test is handed: a ROS domain of its own, an rclpy peer, and ways to start the node."""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+# Before rclpy is imported, for it is read once: nothing leaves this host or comes in from outside.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+_FOREIGN = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "RUST_LOG")
+for _variable in _FOREIGN:
+    os.environ.pop(_variable, None)
+
+# A request to a service that was discovered a moment ago would else be repeated after 3 s.
+os.environ["FASTDDS_DEFAULT_PROFILES_FILE"] = str(
+    Path(__file__).parent / "fixtures" / "fastdds_fast_heartbeat.xml"
+)
+os.environ["RMW_FASTRTPS_USE_QOS_FROM_XML"] = "1"
+
+from harness.domains import claimed_domain  # noqa: E402
+from harness.estimator import Estimator, Topics  # noqa: E402
+from harness.peer import BEST_EFFORT, Peer  # noqa: E402
+from harness.processes import Process, binary  # noqa: E402
+
+StartNode = Callable[..., Process]
+StartEstimator = Callable[..., Estimator]
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test uses at the same time."""
+    with claimed_domain() as claimed:
+        yield claimed
+
+
+@pytest.fixture
+def peer(domain: int) -> Iterator[Peer]:
+    """An rclpy node in the test's domain."""
+    peer = Peer(domain)
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def start_node(domain: int, tmp_path: Path) -> Iterator[StartNode]:
+    """Starts the node with ROS arguments; in the end all that still run must leave with code 0."""
+    started: list[Process] = []
+
+    def start(*ros_arguments: str, environment: dict[str, str] | None = None) -> Process:
+        command = [str(binary("tanker_pose_node"))]
+        if ros_arguments:
+            command += ["--ros-args", *ros_arguments]
+        process = Process(command, domain, tmp_path / f"node_{len(started)}", environment or {})
+        started.append(process)
+        return process
+
+    yield start
+    try:
+        for process in started:
+            if process.running:
+                process.stop()
+    finally:
+        for process in started:
+            process.kill_if_running()
+            print(f"--- {process.name} ---\n{process.log}")
+
+
+@pytest.fixture
+def start_estimator(start_node: StartNode, peer: Peer) -> StartEstimator:
+    """Starts the node, wires the peer to it and waits until they hear each other."""
+
+    def start(*ros_arguments: str, topics: Topics = Topics(), qos=BEST_EFFORT) -> Estimator:
+        estimator = Estimator(peer, start_node(*ros_arguments), topics, qos)
+        estimator.wait_until_heard()
+        return estimator
+
+    return start
+
+
+@pytest.fixture
+def estimator(start_estimator: StartEstimator) -> Estimator:
+    """The node with its defaults and the paper's camera."""
+    estimator = start_estimator()
+    estimator.use_camera()
+    return estimator
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    """Random numbers, the same on every run and different for every test."""
+    return np.random.default_rng(list(request.node.name.encode()))
