@@ -11,7 +11,7 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::{distance_squared, oracle_maximum_likelihood, random_refuelling_scene};
-use tanker_pose::estimation::{Estimator, EstimatorSettings, Observation};
+use tanker_pose::estimation::{Estimator, EstimatorSettings, Initialisation, Observation};
 use tanker_pose::simulation::{Scene, paper_camera};
 use tanker_pose::target::Marker;
 
@@ -146,6 +146,43 @@ fn the_wrong_points_are_left_out() {
         assert!(
             right >= least,
             "{name}: {right} % right, expected {least} %"
+        );
+    }
+}
+
+/// Left and right of the whole symmetric tanker: that fits exactly behind the camera.
+#[test]
+fn exchanged_sides_of_the_tanker_are_never_trusted() {
+    for (seed, (initialisation, max_outliers)) in (60..).zip([
+        (Initialisation::Nominal, 0),
+        (Initialisation::Nominal, 1),
+        (Initialisation::Nominal, 2),
+        (Initialisation::Global, 0),
+        (Initialisation::Global, 2),
+    ]) {
+        let estimator = Estimator::new(EstimatorSettings {
+            initialisation,
+            max_outliers,
+            min_points: 4,
+            ..Default::default()
+        });
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let trusted = (0..FRAMES)
+            .filter(|_| {
+                let scene = scene(6, &mut random);
+                let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+                for (a, b) in [(0, 1), (2, 3)] {
+                    (seen[a].pixel, seen[b].pixel) = (seen[b].pixel, seen[a].pixel);
+                }
+                estimator
+                    .estimate(scene.camera(), &seen, None)
+                    .is_ok_and(|solution| solution.is_trusted())
+            })
+            .count();
+        println!("sides exchanged, {initialisation:?}, {max_outliers} left out: {trusted} trusted");
+        assert_eq!(
+            trusted, 0,
+            "{initialisation:?} with {max_outliers} left out"
         );
     }
 }

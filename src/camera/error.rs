@@ -6,20 +6,20 @@
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum CameraError {
     /// All zero intrinsics: how ROS marks a camera that was never calibrated.
-    #[error("the camera is not calibrated (k[0] is {fx})")]
+    #[error("the camera is not calibrated (k[0] is {fx:?})")]
     NotCalibrated { fx: f64 },
     /// Rectified pixels are announced, but the projection of the rectified image is left zero.
-    #[error("the camera has no projection for rectified pixels (p[0] is {fx})")]
+    #[error("the camera has no projection for rectified pixels (p[0] is {fx:?})")]
     NoProjection { fx: f64 },
     /// A number that is used is NaN or infinite.
-    #[error("{array}[{index}] must be finite, got {value}")]
+    #[error("{array}[{index}] must be finite, got {value:?}")]
     NotFinite {
         array: &'static str,
         index: usize,
         value: f64,
     },
     /// A focal length that no lens has: negative, not in pixels, or a slipped digit.
-    #[error("{array}[{index}], a focal length, must be {min} to {max:e} px, got {value}")]
+    #[error("{array}[{index}], a focal length, must be {min} to {max:e} px, got {value:?}")]
     FocalLength {
         array: &'static str,
         index: usize,
@@ -29,7 +29,7 @@ pub enum CameraError {
     },
     /// A principal point so far away that it can't be one.
     #[error(
-        "{array}[{index}], the principal point, must be within {limit:e} px of the image, got {value}"
+        "{array}[{index}], the principal point, must be within {limit:e} px of the image, got {value:?}"
     )]
     PrincipalPoint {
         array: &'static str,
@@ -38,7 +38,7 @@ pub enum CameraError {
         limit: f64,
     },
     /// An entry that the form of the matrix fixes; `k[1]` and `p[1]` would be skew, which is not supported.
-    #[error("{array}[{index}] must be {expected}, got {value}")]
+    #[error("{array}[{index}] must be {expected}, got {value:?}")]
     FixedEntry {
         array: &'static str,
         index: usize,
@@ -47,7 +47,7 @@ pub enum CameraError {
     },
     /// The projection belongs to a stereo pair's second camera.
     #[error(
-        "p[{index}] must be 0, got {value}: it holds a stereo pair's baseline, and the projection of one camera is needed"
+        "p[{index}] must be 0, got {value:?}: it holds a stereo pair's baseline, and the projection of one camera is needed"
     )]
     Baseline { index: usize, value: f64 },
     /// A lens that we have no formula for.
@@ -66,7 +66,7 @@ pub enum CameraError {
         d: Vec<f64>,
     },
     /// A coefficient that no calibration gives.
-    #[error("d[{index}] must be within {limit:e}, got {value}")]
+    #[error("d[{index}] must be within {limit:e}, got {value:?}")]
     CoefficientTooLarge {
         index: usize,
         value: f64,
@@ -113,11 +113,11 @@ pub enum CameraError {
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum UndistortError {
     /// The pixel is NaN or infinite, or so large that its ray is.
-    #[error("pixel ({u}, {v}) must be finite and have a finite ray")]
+    #[error("pixel ({u:?}, {v:?}) must be finite and have a finite ray")]
     NotFinite { u: f64, v: f64 },
     /// No ray that the lens model was made for falls on this pixel.
     #[error(
-        "pixel ({u}, {v}) lies outside the valid region of the lens model: its distorted radius is \
+        "pixel ({u:?}, {v:?}) lies outside the valid region of the lens model: its distorted radius is \
          {radius:.6} on the plane z = 1, the model reaches {max_radius:.6} in this direction"
     )]
     OutsideValidRegion {

@@ -80,6 +80,14 @@ impl Estimator {
         let judge = exclude::Judge {
             solve: solver,
             prior_cost: |solution: &Solution| self.prior_cost(solution, previous),
+            min_remaining: match self.settings.initialisation {
+                Initialisation::Nominal | Initialisation::Previous => {
+                    exclude::MIN_REMAINING_WITH_PRIOR
+                }
+                Initialisation::Dlt | Initialisation::Global => {
+                    exclude::MIN_REMAINING_WITHOUT_PRIOR
+                }
+            },
         };
         exclude::search(&judge, observations, &suspects, max_outliers).map_or(of_all, Ok)
     }

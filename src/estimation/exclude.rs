@@ -14,8 +14,11 @@ use crate::geometry::pose_error;
 /// Among more points than this only the ones with the largest residuals are suspected, so that the
 /// cost stays bounded: one gross error among many hardly moves the fit of all of them.
 pub(crate) const MAX_SUSPECTS: usize = 12;
-/// Points that must remain: fewer leave nothing that the chi-squared test could judge.
-const MIN_REMAINING: usize = 4;
+/// Points that must remain where a prior says what is plausible: fewer leave nothing to judge by.
+pub(crate) const MIN_REMAINING_WITH_PRIOR: usize = 4;
+/// Points that must remain where nothing does: any four fit some attitude too often. Left and right
+/// exchanged on the whole of a symmetric tanker would pass with two more points left out.
+pub(crate) const MIN_REMAINING_WITHOUT_PRIOR: usize = 5;
 /// Squared Mahalanobis distance at which two hypotheses disagree: no correct pair of poses with most
 /// of their points in common is so far apart.
 const ELSEWHERE: f64 = 30.0;
@@ -26,6 +29,8 @@ pub(crate) struct Judge<S, P> {
     pub(crate) solve: S,
     /// What the prior holds against a pose: a squared distance in sigmas, added to chi-squared.
     pub(crate) prior_cost: P,
+    /// Points that must remain.
+    pub(crate) min_remaining: usize,
 }
 
 impl<S, P> Judge<S, P>
@@ -58,7 +63,7 @@ where
     S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
     P: Fn(&Solution) -> f64,
 {
-    let spare = observations.len().saturating_sub(MIN_REMAINING);
+    let spare = observations.len().saturating_sub(judge.min_remaining);
     let mut scratch = Vec::with_capacity(observations.len());
     if max_outliers >= 1 && spare >= 1 {
         let singles = suspects.iter().map(|&i| [i, i]);

@@ -106,7 +106,7 @@ fn check_in_image(camera: &Camera, seen: &Detection) -> Result<(), Refusal> {
     Err(Refusal::OutsideImage {
         id: seen.id,
         reason: format!(
-            "expected a pixel in or near the {image}, got ({}, {})",
+            "expected a pixel in or near the {image}, got ({:?}, {:?})",
             seen.u_px, seen.v_px
         ),
     })

@@ -124,10 +124,11 @@ impl Pipeline {
         result
     }
 
-    /// Returns the camera in force; none before the first camera info, and while the latest is unusable.
+    /// Returns what the latest camera info came to, with its frame; none before the first one.
     #[must_use]
-    pub fn camera(&self) -> Option<&Camera> {
-        self.camera.as_ref()?.camera.as_ref().ok()
+    pub fn camera(&self) -> Option<(&str, Result<&Camera, &CameraError>)> {
+        let latched = self.camera.as_ref()?;
+        Some((&latched.frame_id, latched.camera.as_ref()))
     }
 
     /// Returns the outcome of one frame.

@@ -41,7 +41,7 @@ pub enum Refusal {
         count: usize,
     },
     /// A pixel that is not a number.
-    #[error("expected finite pixels, got ({u_px}, {v_px}) for id {id}")]
+    #[error("expected finite pixels, got ({u_px:?}, {v_px:?}) for id {id}")]
     NotFinite {
         /// Marker id.
         id: u32,
@@ -51,7 +51,7 @@ pub enum Refusal {
         v_px: f64,
     },
     /// A sigma that cannot be one.
-    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px} for id {id}", least = super::checks::MIN_SIGMA_PX, most = super::checks::MAX_SIGMA_PX)]
+    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px:?} for id {id}", least = super::checks::MIN_SIGMA_PX, most = super::checks::MAX_SIGMA_PX)]
     InvalidSigma {
         /// Marker id.
         id: u32,
@@ -88,7 +88,7 @@ pub enum Refusal {
     },
     /// The best fit is a mirror image.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.3} m: ids exchanged, or a wrong detection?"
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.3e} m: ids exchanged, or a wrong detection?"
     )]
     BehindCamera {
         /// Marker id.

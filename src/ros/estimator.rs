@@ -11,7 +11,6 @@ use super::messages::{
     PoseWithCovarianceStamped, TFMessage,
 };
 use super::once::SaidOnce;
-use crate::camera;
 use crate::config::Settings;
 use crate::estimation::Solution;
 use crate::pipeline::{OutcomeCode, Pipeline, Stamp};
@@ -80,8 +79,6 @@ pub struct Estimator {
     outputs: Outputs,
     node: String,
     marker_map: String,
-    /// The latest camera info as it came, for when the settings change how it is read.
-    latest_info: Option<(camera::CameraInfo, String)>,
     camera: CameraState,
     tally: Tally,
     reporter: Reporter,
@@ -105,7 +102,6 @@ impl Estimator {
             outputs,
             node: node.to_owned(),
             marker_map: marker_map.to_owned(),
-            latest_info: None,
             camera: CameraState::Missing,
             tally: Tally::default(),
             reporter: Reporter::default(),
@@ -125,8 +121,9 @@ impl Estimator {
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
         let info = convert::camera_info(message);
-        self.set_camera(&info, &message.header.frame_id);
-        self.latest_info = Some((info, message.header.frame_id.clone()));
+        // What came of it is asked for below: good and bad ones are told in one place.
+        let _ = self.pipeline.set_camera(&info, &message.header.frame_id);
+        self.note_camera();
     }
 
     /// Takes the detections of an image; publishes what becomes of them.
@@ -151,11 +148,8 @@ impl Estimator {
     /// Takes changed settings, for the next frame on.
     pub fn on_settings(&mut self, settings: Settings) {
         self.pipeline.set_settings(settings);
-        // Whether the image is rectified decides how a camera info is read.
-        if let Some((info, frame_id)) = self.latest_info.take() {
-            self.set_camera(&info, &frame_id);
-            self.latest_info = Some((info, frame_id));
-        }
+        // Whether the image is rectified decides how the camera info is read.
+        self.note_camera();
     }
 
     /// Takes note of a sample on `topic` that could not be decoded.
@@ -204,16 +198,14 @@ impl Estimator {
         );
     }
 
-    fn set_camera(&mut self, info: &camera::CameraInfo, frame_id: &str) {
-        let state = match self.pipeline.set_camera(info, frame_id) {
-            Ok(_) => CameraState::Valid {
+    fn note_camera(&mut self) {
+        let state = match self.pipeline.camera() {
+            None => CameraState::Missing,
+            Some((frame_id, Ok(camera))) => CameraState::Valid {
                 frame_id: frame_id.to_owned(),
-                size_px: self
-                    .pipeline
-                    .camera()
-                    .and_then(camera::Camera::image_size_px),
+                size_px: camera.image_size_px(),
             },
-            Err(error) => CameraState::Invalid {
+            Some((_, Err(error))) => CameraState::Invalid {
                 reason: error.to_string(),
             },
         };

@@ -24,7 +24,7 @@ pub enum MarkerMapError {
         need: usize,
     },
     /// A coordinate that is NaN or infinite.
-    #[error("{place}: {axis} of marker {id} must be a finite number of metres, got {value}")]
+    #[error("{place}: {axis} of marker {id} must be a finite number of metres, got {value:?}")]
     NotFinite {
         place: Place,
         id: u32,

@@ -311,7 +311,7 @@ impl Solver {
                     Ok(Some(marker))
                 } else {
                     Err(format!(
-                        "point {}: expected coordinates within {MAX_COORDINATE_M} m, got ({x}, {y}, {z})",
+                        "point {}: expected coordinates within {MAX_COORDINATE_M} m, got ({x:?}, {y:?}, {z:?})",
                         point.id
                     ))
                 }

@@ -35,13 +35,13 @@ fn the_unspoilt_camera_info_passes() {
 
 #[test]
 fn a_camera_that_is_not_calibrated_is_refused() {
-    let message = "the camera is not calibrated (k[0] is 0)";
+    let message = "the camera is not calibrated (k[0] is 0.0)";
     assert_eq!(raw(|info| *info = CameraInfo::default()), message);
     assert_eq!(raw(|info| info.k[0] = 0.0), message);
     assert_eq!(rectified(|info| info.k = [0.0; 9]), message);
     assert_eq!(
         rectified(|info| info.p = [0.0; 12]),
-        "the camera has no projection for rectified pixels (p[0] is 0)"
+        "the camera has no projection for rectified pixels (p[0] is 0.0)"
     );
 }
 
@@ -80,11 +80,11 @@ fn anything_used_that_is_not_finite_is_refused() {
 fn focal_lengths_that_no_lens_has_are_refused() {
     assert_eq!(
         raw(|info| info.k[0] = -571.0),
-        "k[0], a focal length, must be 1 to 1e6 px, got -571"
+        "k[0], a focal length, must be 1 to 1e6 px, got -571.0"
     );
     assert_eq!(
         raw(|info| info.k[4] = 0.0),
-        "k[4], a focal length, must be 1 to 1e6 px, got 0"
+        "k[4], a focal length, must be 1 to 1e6 px, got 0.0"
     );
     assert_eq!(
         raw(|info| info.k[4] = 0.008),
@@ -92,7 +92,7 @@ fn focal_lengths_that_no_lens_has_are_refused() {
     );
     assert_eq!(
         rectified(|info| info.p[5] = 1.0e9),
-        "p[5], a focal length, must be 1 to 1e6 px, got 1000000000"
+        "p[5], a focal length, must be 1 to 1e6 px, got 1000000000.0"
     );
 }
 
@@ -103,14 +103,14 @@ fn a_principal_point_may_lie_outside_the_image_but_not_anywhere() {
     assert!(Camera::from_info(&far, false).is_ok());
     assert_eq!(
         raw(|info| info.k[5] = -1.5e6),
-        "k[5], the principal point, must be within 1e6 px of the image, got -1500000"
+        "k[5], the principal point, must be within 1e6 px of the image, got -1500000.0"
     );
 }
 
 #[test]
 fn skew_and_entries_that_a_matrix_fixes_are_refused() {
     assert_eq!(raw(|info| info.k[1] = 0.5), "k[1] must be 0, got 0.5");
-    assert_eq!(raw(|info| info.k[8] = 0.0), "k[8] must be 1, got 0");
+    assert_eq!(raw(|info| info.k[8] = 0.0), "k[8] must be 1, got 0.0");
     for index in [1, 3, 6, 7, 8] {
         assert!(matches!(
             refusal(false, |info| info.k[index] = 2.0),
@@ -190,7 +190,7 @@ fn another_number_of_coefficients_than_the_lens_has_is_refused() {
 fn a_coefficient_that_no_calibration_gives_is_refused() {
     assert_eq!(
         raw(|info| info.d[1] = -1.0e12),
-        "d[1] must be within 1e9, got -1000000000000"
+        "d[1] must be within 1e9, got -1000000000000.0"
     );
 }
 
