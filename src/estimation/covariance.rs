@@ -1,6 +1,6 @@
 //! What the noise of the pixels does to a pose that is not the maximum likelihood one.
 
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
+use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
 
 use super::Observation;
 use super::collinearity::{Symmetric3, object_space_weight};
@@ -41,15 +41,6 @@ pub(crate) fn sandwich(
         .iter()
         .all(|value| value.is_finite())
         .then_some(covariance)
-}
-
-/// Returns the information (inverse covariance) of a measured ray's two coordinates: 11, 12, 22.
-#[inline]
-pub(crate) fn ray_information(camera: &Camera, ray: Ray, sigma_px: f64) -> Option<[f64; 3]> {
-    let (_, pixel_by_ray) = camera.project(ray)?;
-    let whitened = pixel_by_ray / sigma_px;
-    let information: Matrix2<f64> = whitened.tr_mul(&whitened);
-    Some([information.m11, information.m12, information.m22])
 }
 
 /// A square root of the measured ray's covariance, no unit.

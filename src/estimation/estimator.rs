@@ -2,16 +2,13 @@
 
 use nalgebra::{Rotation3, UnitQuaternion};
 
-use super::ambiguity::{self, is_same, likelihood_ratio};
-use super::collinearity::CollinearityCost;
+use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
 use super::exclude;
 use super::initialise::{self, linear_rotation};
 use super::problem::Problem;
 use super::refine::Fit;
 use super::trust::TrustLimits;
-use super::{
-    EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Refinement, Solution,
-};
+use super::{EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Solution};
 use crate::camera::{Camera, Ray};
 use crate::geometry::PoseCovariance;
 
@@ -107,15 +104,14 @@ impl Estimator {
                 need,
             });
         }
-        let problem = Problem::new(camera, self.settings.refinement, observations);
-        let cost = problem.cost(observations)?;
+        let problem = Problem::new(camera, self.settings.refinement, observations)?;
         let nominal = || {
             let seed = &self.settings.nominal_camera_from_tanker;
-            self.solve_from(&problem, observations, &cost, seed, Initialisation::Nominal)
+            self.solve_from(&problem, seed, Initialisation::Nominal)
         };
         match (start, previous) {
             (Initialisation::Previous, Some(seed)) => {
-                match self.solve_from(&problem, observations, &cost, seed, start) {
+                match self.solve_from(&problem, seed, start) {
                     Ok(solution) if solution.is_trusted() => Ok(solution),
                     // A tanker that turned meanwhile, or a last pose that was wrong: begin anew.
                     _ => nominal(),
@@ -124,12 +120,9 @@ impl Estimator {
             (Initialisation::Nominal | Initialisation::Previous, _) => nominal(),
             (Initialisation::Dlt, _) => {
                 let seed = dlt_seed(camera, observations)?;
-                self.solve_from(&problem, observations, &cost, &seed, start)
+                self.solve_from(&problem, &seed, start)
             }
-            (Initialisation::Global, _) => {
-                let candidate = globally(&problem, observations, &cost)?;
-                Ok(self.judge(&problem, observations, &candidate))
-            }
+            (Initialisation::Global, _) => Ok(self.judge(&problem, &globally(&problem)?)),
         }
     }
 
@@ -156,39 +149,31 @@ impl Estimator {
     fn solve_from(
         &self,
         problem: &Problem,
-        observations: &[Observation],
-        cost: &CollinearityCost,
         seed: &Rotation3<f64>,
         initialisation: Initialisation,
     ) -> Result<Solution, EstimateError> {
-        let minimum = problem.descend(cost, seed)?;
-        let fit = problem.fit(observations, cost, &minimum.rotation)?;
-        let rival = ambiguity::rival(problem, observations, cost, &fit.pose);
+        let minimum = problem.descend(seed)?;
+        let fit = problem.fit(&minimum.rotation)?;
         let candidate = Candidate {
             fit,
-            rival_chi_squared: rival.map(|rival| rival.chi_squared),
+            rival_chi_squared: ambiguity::rival(problem, &fit).map(|rival| rival.chi_squared),
             iterations: minimum.iterations.saturating_add(fit.iterations),
             initialisation,
         };
-        Ok(self.judge(problem, observations, &candidate))
+        Ok(self.judge(problem, &candidate))
     }
 
-    fn judge(
-        &self,
-        problem: &Problem,
-        observations: &[Observation],
-        candidate: &Candidate,
-    ) -> Solution {
+    fn judge(&self, problem: &Problem, candidate: &Candidate) -> Solution {
         let fit = &candidate.fit;
-        let degrees_of_freedom = 2 * observations.len() - 6;
-        let lever = fit.pose.rotation * problem.markers_mean.coords;
+        let residuals = 2 * problem.observations.len();
+        let lever = fit.pose.rotation * problem.points.mean.coords;
         Solution {
             camera_from_tanker: problem.pose(fit),
             covariance: PoseCovariance::from_point(&fit.covariance, &lever),
-            rms_px: problem.rms_px(observations, fit),
+            rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
-            degrees_of_freedom: u16::try_from(degrees_of_freedom).unwrap_or(u16::MAX),
-            chi_squared_limit: self.limits.limit(degrees_of_freedom),
+            degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),
+            chi_squared_limit: self.limits.limit(residuals - 6),
             iterations: candidate.iterations,
             initialisation: candidate.initialisation,
             ambiguity: candidate
@@ -240,58 +225,62 @@ fn dlt_seed(
 }
 
 /// The best of all minima in front of the camera, and the second best as its rival.
-fn globally(
-    problem: &Problem,
-    observations: &[Observation],
-    cost: &CollinearityCost,
-) -> Result<Candidate, EstimateError> {
-    let minima = initialise::search(cost, problem.step_tolerance());
+fn globally(problem: &Problem) -> Result<Candidate, EstimateError> {
+    let minima = initialise::search(&problem.cost, problem.step_tolerance());
     let mut iterations = minima.iterations;
-    let mut best: Option<(Fit, f64)> = None;
-    let mut rival_merit: Option<(Fit, f64)> = None;
+    let mut ranking = Ranking::default();
     // With every minimum behind the camera, that is the reason.
     let mut failure = minima
         .behind
-        .and_then(|minimum| problem.fit(observations, cost, &minimum.rotation).err())
+        .and_then(|minimum| problem.fit(&minimum.rotation).err())
         .unwrap_or(EstimateError::NoConvergence { iterations });
-    let mut consider = |fit: Fit, merit: f64| match &best {
-        Some((known, _)) if is_same(&known.pose.rotation, &fit.pose.rotation) => {}
-        Some((_, best_merit)) if *best_merit <= merit => {
-            if rival_merit.as_ref().is_none_or(|(_, rival)| merit < *rival) {
-                rival_merit = Some((fit, merit));
-            }
-        }
-        _ => {
-            rival_merit = best.take();
-            best = Some((fit, merit));
-        }
-    };
     for minimum in minima.in_front.iter().flatten() {
-        match problem.fit(observations, cost, &minimum.rotation) {
+        let best = ranking.best.map(|(fit, _)| fit.chi_squared);
+        let least = problem.least_chi_squared(minimum);
+        if matches!((best, least), (Some(best), Some(least)) if least > best + NEGLIGIBLE) {
+            continue;
+        }
+        match problem.fit(&minimum.rotation) {
             Ok(fit) => {
                 iterations = iterations.saturating_add(fit.iterations);
-                consider(fit, merit(problem, &fit, minimum.cost));
-                if let Some(rival) = ambiguity::rival(problem, observations, cost, &fit.pose) {
-                    let rival_cost = cost.value(&rival.pose.rotation);
-                    consider(rival, merit(problem, &rival, rival_cost));
-                }
+                ranking.consider(fit, problem.merit(&fit));
             }
             Err(error) => failure = error,
         }
     }
-    let (fit, _) = best.ok_or(failure)?;
+    let (fit, _) = ranking.best.ok_or(failure)?;
+    if let Some(rival) = ambiguity::rival(problem, &fit) {
+        ranking.consider(rival, problem.merit(&rival));
+    }
+    let (fit, _) = ranking.best.unwrap_or((fit, 0.0));
     Ok(Candidate {
         fit,
-        rival_chi_squared: rival_merit.map(|(rival, _)| rival.chi_squared),
+        rival_chi_squared: ranking.rival.map(|(rival, _)| rival.chi_squared),
         iterations,
         initialisation: Initialisation::Global,
     })
 }
 
-/// What "best" means: each refinement minimises its own error.
-fn merit(problem: &Problem, fit: &Fit, collinearity: f64) -> f64 {
-    match problem.refinement {
-        Refinement::MaximumLikelihood => fit.chi_squared,
-        Refinement::None => collinearity,
+/// The best two of different poses, with their merits.
+#[derive(Default)]
+struct Ranking {
+    best: Option<(Fit, f64)>,
+    rival: Option<(Fit, f64)>,
+}
+
+impl Ranking {
+    fn consider(&mut self, fit: Fit, merit: f64) {
+        match &self.best {
+            Some((known, _)) if is_same(&known.pose.rotation, &fit.pose.rotation) => {}
+            Some((_, best)) if *best <= merit => {
+                if self.rival.as_ref().is_none_or(|(_, rival)| merit < *rival) {
+                    self.rival = Some((fit, merit));
+                }
+            }
+            _ => {
+                self.rival = self.best.take();
+                self.best = Some((fit, merit));
+            }
+        }
     }
 }

@@ -22,10 +22,14 @@ mod covariance;
 mod estimator;
 mod exclude;
 mod initialise;
+mod lane;
+mod linearise;
 mod newton;
 mod orthogonal_iteration;
+mod points;
 mod problem;
 mod refine;
+mod symmetric6;
 mod trust;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector2};

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::collinearity::CollinearityCost;
-use crate::geometry::{axial, cayley, skew};
+use crate::geometry::{axial, cayley};
 
 /// Where a descent ended.
 #[derive(Debug, Clone, Copy)]
@@ -87,9 +87,8 @@ fn newton_step(
     let r = rotation.matrix();
     let a = r.tr_mul(y);
     let gradient = axial(&a);
-    let directions = [Vector3::x(), Vector3::y(), Vector3::z()].map(|e| r * skew(e));
     let hessian =
-        cost.curvature(&directions) + (a + a.transpose()) * 0.5 - Matrix3::identity() * a.trace();
+        cost.curvature(rotation) + (a + a.transpose()) * 0.5 - Matrix3::identity() * a.trace();
     let step = -solve_damped(&hessian, &gradient);
     let length = step.norm();
     if length > MAX_STEP {

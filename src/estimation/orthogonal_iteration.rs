@@ -7,8 +7,9 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::EstimateError;
-use super::collinearity::{CollinearityCost, CollinearityMoments, mean, object_space_weight};
+use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::newton::{self, Minimum};
+use super::points::{Points, mean};
 use crate::camera::Ray;
 use crate::geometry::{nearest_rotation, nearest_rotation_by_svd};
 
@@ -159,13 +160,10 @@ fn cost(
     rays: &[Ray],
     markers_in_tanker: &[Point3<f64>],
 ) -> Result<(CollinearityCost, Point3<f64>), EstimateError> {
-    let p_mean = mean(markers_in_tanker.iter());
-    let mut moments = CollinearityMoments::ZERO;
-    for (ray, p) in rays.iter().zip(markers_in_tanker) {
-        moments.add(&(p - p_mean), &object_space_weight(*ray));
-    }
+    let points = Points::from_rays(rays, markers_in_tanker);
+    let moments = CollinearityMoments::new(&points, Weighting::ObjectSpace);
     let cost = CollinearityCost::new(&moments).ok_or(EstimateError::SAME_RAYS)?;
-    Ok((cost, p_mean))
+    Ok((cost, points.mean))
 }
 
 fn check(rays: &[Ray], markers_in_tanker: &[Point3<f64>]) -> Result<f64, EstimateError> {

@@ -1,74 +1,55 @@
-//! One frame's problem, prepared: markers about their mean, the quadratic cost, fits from a seed.
+//! One frame's problem, prepared: points about their mean, the quadratic cost, fits from a seed.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
 
-use super::collinearity::{
-    CollinearityCost, CollinearityMoments, image_weight, mean, object_space_weight,
-};
-use super::covariance::{ray_information, sandwich};
+use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
+use super::covariance::sandwich;
+use super::linearise::{LensResiduals, PinholeResiduals};
+use super::points::Points;
 use super::refine::{self, CentredPose, Fit, FitFailure};
 use super::{EstimateError, Observation, Refinement, newton};
 use crate::camera::Camera;
 
-/// rad; a start for maximum likelihood needs no more.
-pub(crate) const START_TOLERANCE: f64 = 1e-3;
+/// rad; a start for maximum likelihood needs no more: Newton's error is about the square of its step.
+const START_TOLERANCE: f64 = 0.03;
 /// rad; convergence is quadratic, so the fixed point is then met to rounding.
 const FIXED_POINT_TOLERANCE: f64 = 1e-7;
-/// Least second moment of the markers about their line, relative to the first: a thousandth in length.
-const MIN_WIDTH_SHARE: f64 = 1e-6;
 
-/// A frame with its camera: what every hypothesis about it shares.
+/// A frame with its camera: what every start and every rival pose shares.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
-    pub(crate) camera: &'a Camera,
-    pub(crate) refinement: Refinement,
-    /// Reference point of all fits, m, tanker frame.
-    pub(crate) markers_mean: Point3<f64>,
+    camera: &'a Camera,
+    refinement: Refinement,
+    pub(crate) observations: &'a [Observation],
+    pub(crate) points: Points,
+    pub(crate) cost: CollinearityCost,
 }
 
 impl<'a> Problem<'a> {
+    /// Returns the problem with the quadratic cost of the paper, or the one nearest to maximum
+    /// likelihood.
     pub(crate) fn new(
         camera: &'a Camera,
         refinement: Refinement,
-        observations: &[Observation],
-    ) -> Self {
-        let markers_mean = mean(observations.iter().map(|o| &o.marker_in_tanker));
-        Self {
+        observations: &'a [Observation],
+    ) -> Result<Self, EstimateError> {
+        let points = Points::new(camera, observations)?;
+        let weighting = match refinement {
+            Refinement::None => Weighting::ObjectSpace,
+            Refinement::MaximumLikelihood => Weighting::Image,
+        };
+        let moments = CollinearityMoments::new(&points, weighting);
+        let cost = CollinearityCost::new(&moments).ok_or(EstimateError::SAME_RAYS)?;
+        Ok(Self {
             camera,
             refinement,
-            markers_mean,
-        }
+            observations,
+            points,
+            cost,
+        })
     }
 
-    /// Returns the quadratic cost: that of the paper, or the one nearest to maximum likelihood.
-    pub(crate) fn cost(
-        &self,
-        observations: &[Observation],
-    ) -> Result<CollinearityCost, EstimateError> {
-        let mut moments = CollinearityMoments::ZERO;
-        for observation in observations {
-            let ray = self
-                .camera
-                .ray_from_pixel(observation.pixel)
-                .map_err(|cause| EstimateError::NoRay {
-                    id: observation.id,
-                    cause,
-                })?;
-            let weight = match self.refinement {
-                Refinement::None => object_space_weight(ray),
-                Refinement::MaximumLikelihood => {
-                    let information = ray_information(self.camera, ray, observation.sigma_px)
-                        .ok_or(EstimateError::SAME_RAYS)?;
-                    image_weight(ray, information)
-                }
-            };
-            moments.add(&(observation.marker_in_tanker - self.markers_mean), &weight);
-        }
-        Self::check_spread(observations)?;
-        CollinearityCost::new(&moments).ok_or(EstimateError::SAME_RAYS)
-    }
-
-    /// Returns how far from the prior's basin a minimum of the cost needs to be followed.
+    /// Returns the step, rad, under which a minimum of the cost is near enough.
     pub(crate) fn step_tolerance(&self) -> f64 {
         match self.refinement {
             Refinement::None => FIXED_POINT_TOLERANCE,
@@ -77,12 +58,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the minimum in whose basin `seed` lies.
-    pub(crate) fn descend(
-        &self,
-        cost: &CollinearityCost,
-        seed: &Rotation3<f64>,
-    ) -> Result<newton::Minimum, EstimateError> {
-        let minimum = newton::minimise(cost, seed, self.step_tolerance());
+    pub(crate) fn descend(&self, seed: &Rotation3<f64>) -> Result<newton::Minimum, EstimateError> {
+        let minimum = newton::minimise(&self.cost, seed, self.step_tolerance());
         if minimum.converged {
             Ok(minimum)
         } else {
@@ -93,90 +70,86 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the final pose from a minimum of the cost, every point in front of the camera.
-    pub(crate) fn fit(
-        &self,
-        observations: &[Observation],
-        cost: &CollinearityCost,
-        rotation: &Rotation3<f64>,
-    ) -> Result<Fit, EstimateError> {
+    pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
         let start = CentredPose {
             rotation: *rotation,
-            centre_in_camera: cost.centre_in_camera(rotation),
+            centre_in_camera: self.cost.centre_in_camera(rotation),
         };
-        self.check_in_front(observations, &start)?;
         let fit = match self.refinement {
-            Refinement::MaximumLikelihood => {
-                refine::maximum_likelihood(self.camera, observations, &self.markers_mean, start)
-                    .map_err(|failure| self.explain(failure, observations, &start))?
+            Refinement::None => self.as_it_is(start)?,
+            Refinement::MaximumLikelihood => if self.camera.is_pinhole() {
+                refine::maximum_likelihood(&PinholeResiduals(&self.points), start)
+            } else {
+                refine::maximum_likelihood(&self.lens_residuals(), start)
             }
-            Refinement::None => self.as_it_is(observations, start)?,
+            .map_err(|failure| self.explain(failure, &start))?,
         };
-        self.check_in_front(observations, &fit.pose)?;
+        self.check_in_front(&fit.pose)?;
         Ok(fit)
     }
 
     /// The paper's own estimate, with the covariance that it really has.
-    fn as_it_is(
-        &self,
-        observations: &[Observation],
-        pose: CentredPose,
-    ) -> Result<Fit, EstimateError> {
-        let chi_squared = refine::chi_squared(self.camera, observations, &self.markers_mean, &pose)
-            .ok_or_else(|| self.explain(FitFailure::StartNotVisible, observations, &pose))?;
-        let covariance = sandwich(self.camera, observations, &self.markers_mean, &pose)
+    fn as_it_is(&self, pose: CentredPose) -> Result<Fit, EstimateError> {
+        let (chi_squared, squared_residuals_px) =
+            refine::squared_residuals(&self.lens_residuals(), &pose)
+                .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
+        let covariance = sandwich(self.camera, self.observations, &self.points.mean, &pose)
             .ok_or(EstimateError::SINGULAR)?;
         Ok(Fit {
             pose,
             chi_squared,
+            squared_residuals_px,
             covariance,
             iterations: 0,
         })
     }
 
+    fn lens_residuals(&self) -> LensResiduals<'_> {
+        LensResiduals {
+            camera: self.camera,
+            observations: self.observations,
+            markers_mean: self.points.mean,
+        }
+    }
+
     /// Returns `camera_from_tanker` of a fit.
     pub(crate) fn pose(&self, fit: &Fit) -> Isometry3<f64> {
-        let t = fit.pose.centre_in_camera - fit.pose.rotation * self.markers_mean.coords;
+        let t = fit.pose.centre_in_camera - fit.pose.rotation * self.points.mean.coords;
         Isometry3::from_parts(
             Translation3::from(t),
             UnitQuaternion::from_rotation_matrix(&fit.pose.rotation),
         )
     }
 
-    /// Returns the root mean square residual over columns and rows, px.
-    pub(crate) fn rms_px(&self, observations: &[Observation], fit: &Fit) -> f64 {
-        let unweighted = observations.iter().try_fold(0.0, |sum, observation| {
-            refine::residual_px(self.camera, observation, &self.markers_mean, &fit.pose)
-                .map(|residual| sum + residual.norm_squared())
-        });
-        unweighted.map_or(f64::NAN, |sum| {
-            (sum / (2 * observations.len()) as f64).sqrt()
-        })
-    }
-
-    /// Refuses points on one line: the turn about it is free.
-    fn check_spread(observations: &[Observation]) -> Result<(), EstimateError> {
-        let s = scatter(observations);
-        // The second invariant is about the product of the two largest eigenvalues.
-        let second = s.m11 * s.m22 + s.m22 * s.m33 + s.m33 * s.m11
-            - (s.m12 * s.m12 + s.m23 * s.m23 + s.m13 * s.m13);
-        if second > MIN_WIDTH_SHARE * s.trace() * s.trace() {
-            Ok(())
-        } else {
-            Err(EstimateError::ON_ONE_LINE)
+    /// What "best" means: each refinement minimises its own error.
+    pub(crate) fn merit(&self, fit: &Fit) -> f64 {
+        match self.refinement {
+            Refinement::MaximumLikelihood => fit.chi_squared,
+            Refinement::None => self.cost.value(&fit.pose.rotation),
         }
     }
 
-    fn check_in_front(
-        &self,
-        observations: &[Observation],
-        pose: &CentredPose,
-    ) -> Result<(), EstimateError> {
-        for observation in observations {
-            let arm = pose.rotation * (observation.marker_in_tanker - self.markers_mean);
+    /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; none for the
+    /// paper's cost, which is not weighted by the noise.
+    ///
+    /// The cost is the sum of squared whitened residuals times squared depths, to first order.
+    pub(crate) fn least_chi_squared(&self, minimum: &newton::Minimum) -> Option<f64> {
+        let centre_depth = self.cost.centre_in_camera(&minimum.rotation).z;
+        let largest_depth = centre_depth + self.points.radius;
+        (self.refinement == Refinement::MaximumLikelihood)
+            .then_some(minimum.cost / (largest_depth * largest_depth))
+    }
+
+    fn check_in_front(&self, pose: &CentredPose) -> Result<(), EstimateError> {
+        if pose.centre_in_camera.z > self.points.radius {
+            return Ok(()); // no turn brings a marker behind
+        }
+        for seen in self.observations {
+            let arm = pose.rotation * (seen.marker_in_tanker - self.points.mean);
             let depth_m = arm.z + pose.centre_in_camera.z;
             if !(depth_m > 0.0 && depth_m.is_finite()) {
                 return Err(EstimateError::BehindCamera {
-                    id: observation.id,
+                    id: seen.id,
                     depth_m,
                 });
             }
@@ -184,44 +157,17 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    fn explain(
-        &self,
-        failure: FitFailure,
-        observations: &[Observation],
-        start: &CentredPose,
-    ) -> EstimateError {
+    fn explain(&self, failure: FitFailure, start: &CentredPose) -> EstimateError {
         match failure {
             FitFailure::Singular => EstimateError::SINGULAR,
             FitFailure::NotConverged => EstimateError::NoConvergence {
                 iterations: refine::MAX_ITERATIONS,
             },
-            FitFailure::StartNotVisible => {
-                self.check_in_front(observations, start).err().unwrap_or(
-                    // In front, yet without a pixel: the lens model does not reach there.
-                    EstimateError::NoConvergence { iterations: 0 },
-                )
-            }
+            // In front, yet without a pixel: the lens model does not reach there.
+            FitFailure::StartNotVisible => self
+                .check_in_front(start)
+                .err()
+                .unwrap_or(EstimateError::NoConvergence { iterations: 0 }),
         }
     }
-}
-
-/// Returns the direction in which the markers spread least, tanker frame.
-pub(crate) fn flattest_axis(observations: &[Observation]) -> Option<Vector3<f64>> {
-    let eigen = scatter(observations).symmetric_eigen();
-    let axis = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imin())
-        .into_owned();
-    axis.iter().all(|value| value.is_finite()).then_some(axis)
-}
-
-/// Second moments of the markers about their mean, m².
-fn scatter(observations: &[Observation]) -> Matrix3<f64> {
-    let centre = mean(observations.iter().map(|o| &o.marker_in_tanker));
-    observations
-        .iter()
-        .fold(Matrix3::zeros(), |sum, observation| {
-            let p = observation.marker_in_tanker - centre;
-            sum + p * p.transpose()
-        })
 }

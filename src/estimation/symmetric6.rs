@@ -1,0 +1,142 @@
+//! The 6×6 normal equations of a pose, solved by `L D Lᵀ` without a loop that the compiler cannot unroll.
+
+use nalgebra::Matrix6;
+
+pub(crate) type Vector = [f64; 6];
+
+/// Pivots below this share of their diagonal entry mean a direction that the points leave free.
+const MIN_PIVOT_SHARE: f64 = 1e-13;
+
+/// `A = L D Lᵀ`, `L` with ones on its diagonal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Factor {
+    l: [[f64; 6]; 6],
+    inverse_d: Vector,
+}
+
+impl Factor {
+    /// Returns the factors of a symmetric matrix, of which the lower triangle is read; none unless it
+    /// is positive definite, and far enough from singular for its inverse to mean something.
+    #[inline]
+    pub(crate) fn new(a: &[[f64; 6]; 6]) -> Option<Self> {
+        let mut l = [[0.0; 6]; 6];
+        let mut inverse_d = [0.0; 6];
+        for j in 0..6 {
+            // Row j of L D, kept beside L.
+            let mut ld = [0.0; 6];
+            let mut pivot = a[j][j];
+            for k in 0..j {
+                ld[k] = l[j][k];
+                l[j][k] *= inverse_d[k];
+                pivot -= ld[k] * l[j][k];
+            }
+            if !(pivot > MIN_PIVOT_SHARE * a[j][j]) {
+                return None;
+            }
+            inverse_d[j] = 1.0 / pivot;
+            for i in j + 1..6 {
+                // `l[i][..j]` already holds `L D`; it is divided by `D` in its own turn.
+                let mut value = a[i][j];
+                for k in 0..j {
+                    value -= l[i][k] * l[j][k];
+                }
+                l[i][j] = value;
+            }
+        }
+        inverse_d
+            .iter()
+            .all(|value| value.is_finite())
+            .then_some(Self { l, inverse_d })
+    }
+
+    /// Returns `A⁻¹ b`.
+    #[inline]
+    pub(crate) fn solve(&self, b: &Vector) -> Vector {
+        let mut x = *b;
+        for i in 0..6 {
+            for k in 0..i {
+                x[i] -= self.l[i][k] * x[k];
+            }
+        }
+        for i in 0..6 {
+            x[i] *= self.inverse_d[i];
+        }
+        for i in (0..6).rev() {
+            for k in i + 1..6 {
+                x[i] -= self.l[k][i] * x[k];
+            }
+        }
+        x
+    }
+
+    /// Returns `A⁻¹`, exactly symmetric.
+    #[inline]
+    pub(crate) fn inverse(&self) -> Matrix6<f64> {
+        // Columns of L⁻¹, below the ones of its diagonal.
+        let mut m = [[0.0; 6]; 6];
+        for j in 0..6 {
+            m[j][j] = 1.0;
+            for i in j + 1..6 {
+                let mut value = 0.0;
+                for k in j..i {
+                    value -= self.l[i][k] * m[k][j];
+                }
+                m[i][j] = value;
+            }
+        }
+        let mut inverse = Matrix6::zeros();
+        for a in 0..6 {
+            for b in a..6 {
+                let mut value = 0.0;
+                for k in b..6 {
+                    value += m[k][a] * self.inverse_d[k] * m[k][b];
+                }
+                inverse[(a, b)] = value;
+                inverse[(b, a)] = value;
+            }
+        }
+        inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix6, Vector6};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Relative; condition numbers of a few thousand.
+    const ROUNDING: f64 = 1e-10;
+
+    fn rows(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
+        std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
+    }
+
+    #[test]
+    fn solution_and_inverse_agree_with_a_library() {
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        for _ in 0..1000 {
+            let half = Matrix6::from_fn(|_, _| random.random_range(-1.0..1.0_f64));
+            let a = half * half.transpose() + Matrix6::identity() * 0.01;
+            let b = Vector6::from_fn(|_, _| random.random_range(-1.0..1.0));
+            let factor = Factor::new(&rows(&a)).expect("positive definite");
+            let x = Vector6::from(factor.solve(&b.into()));
+            let expected = a.cholesky().expect("positive definite");
+            assert!((x - expected.solve(&b)).norm() < ROUNDING * x.norm());
+            let inverse = expected.inverse();
+            assert!((factor.inverse() - inverse).norm() < ROUNDING * inverse.norm());
+            assert_eq!(factor.inverse(), factor.inverse().transpose());
+        }
+    }
+
+    #[test]
+    fn singular_indefinite_and_meaningless_matrices_have_no_factor() {
+        let mut a = rows(&Matrix6::identity());
+        a[5] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        assert!(Factor::new(&a).is_none(), "two equal rows");
+        assert!(Factor::new(&rows(&-Matrix6::identity())).is_none());
+        assert!(Factor::new(&rows(&Matrix6::from_element(f64::NAN))).is_none());
+        assert!(Factor::new(&[[0.0; 6]; 6]).is_none());
+    }
+}
