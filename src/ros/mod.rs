@@ -8,7 +8,7 @@
 //! messages, convert                  the wire <-> plain types
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
-//! node                               all of it together, until a signal
+//! node                               all of it together, until a signal or a tool ends it
 //! ```
 //!
 //! Tools that talk ROS start from [`participant::RosNode::open`].

@@ -1,11 +1,11 @@
-//! The node: parameters and marker map in, topics open, messages to the estimator until a signal.
+//! The node: parameters and marker map in, topics open, messages to the estimator until it has to stop.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use async_signal::{Signal, Signals};
-use futures::{StreamExt, pin_mut, select_biased};
+use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 use ros2_client::{NodeOptions, Subscription};
 
 use super::arguments::Arguments;
@@ -24,8 +24,14 @@ use crate::target::{MarkerMap, MarkerMapError};
 /// What the node is called unless it is remapped.
 pub const NODE_NAME: &str = "tanker_pose";
 
-const FEATURE_POINTS: &str = "feature_points";
-const CAMERA_INFO: &str = "camera_info";
+/// Input: the detections of an image.
+pub const FEATURE_POINTS: &str = "feature_points";
+/// Input: the camera that took it.
+pub const CAMERA_INFO: &str = "camera_info";
+/// Output: trusted poses.
+pub const POSE: &str = "pose";
+/// Output: what became of every image.
+pub const STATUS: &str = "status";
 
 /// Samples that wait for the node: enough for a hiccup, too few to lag behind.
 const INPUT: QosProfile = sensor_data(10);
@@ -69,18 +75,35 @@ pub enum NodeError {
     Endpoint(#[from] EndpointError),
 }
 
-/// Runs the node until SIGINT or SIGTERM, and leaves the graph.
+/// Runs the node until SIGINT or SIGTERM, and leaves the graph; starts logging.
 ///
 /// # Errors
 /// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal.
 pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     logging::start(arguments, &names);
+    // From here on a signal is kept until the node reads it, and ends it in good order.
+    let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(NodeError::Signals)?;
+    run_until(arguments, environment, async move {
+        let _ = signals.next().await;
+    })
+}
+
+/// Runs the node until `stop` ends, and leaves the graph: for programs that have a node in a thread of theirs.
+///
+/// Signals and logging are the caller's: without [`logging::start`] before, nothing is said anywhere.
+///
+/// # Errors
+/// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop`.
+pub fn run_until(
+    arguments: &Arguments,
+    environment: &Environment,
+    stop: impl Future<Output = ()>,
+) -> Result<(), NodeError> {
+    let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     let start = start_values(arguments, &names.fully_qualified())?;
     let configuration = Configuration::from(&start.parameters);
     let map = Arc::new(marker_map(&configuration.marker_map)?);
-    // From here on a signal is kept until the loop reads it, and ends the node in good order.
-    let signals = Signals::new([Signal::Int, Signal::Term]).map_err(NodeError::Signals)?;
 
     let (parameters, changes) = SharedParameters::new(start.parameters);
     let options = parameters.declare(NodeOptions::new());
@@ -92,7 +115,7 @@ pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeE
     let served = Service::open(&mut ros, &configuration, &map).map(|mut service| {
         introduce(&ros, environment, &map, configuration.publish_tf);
         let update = || Configuration::from(&parameters.snapshot()).settings;
-        smol::block_on(service.serve(&ros, signals, changes, update));
+        smol::block_on(service.serve(&ros, stop, changes, update));
     });
     if served.is_ok() {
         log::info!("leaving");
@@ -127,8 +150,8 @@ fn introduce(ros: &RosNode, environment: &Environment, map: &MarkerMap, publish_
         "listening to {} and {}, publishing {}, {}, {}{}",
         topic(FEATURE_POINTS),
         topic(CAMERA_INFO),
-        topic("pose"),
-        topic("status"),
+        topic(POSE),
+        topic(STATUS),
         topic("/diagnostics"),
         if publish_tf {
             format!(", {}", topic("/tf"))
@@ -158,8 +181,8 @@ impl Service {
             None
         };
         let outputs = Outputs {
-            pose: output(ros, "pose", &OUTPUT)?,
-            status: output(ros, "status", &OUTPUT)?,
+            pose: output(ros, POSE, &OUTPUT)?,
+            status: output(ros, STATUS, &OUTPUT)?,
             transform,
             diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
         };
@@ -172,11 +195,11 @@ impl Service {
         })
     }
 
-    /// Feeds the estimator until a signal comes.
+    /// Feeds the estimator until `stop` ends.
     async fn serve(
         &mut self,
         ros: &RosNode,
-        signals: Signals,
+        stop: impl Future<Output = ()>,
         changes: smol::channel::Receiver<()>,
         update: impl Fn() -> crate::config::Settings,
     ) {
@@ -184,13 +207,13 @@ impl Service {
         let camera_infos = self.camera_info.async_stream();
         let feature_points = self.feature_points.async_stream();
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        let (mut signals, changes) = (signals.fuse(), changes.fuse());
-        pin_mut!(camera_infos, feature_points, seconds, changes);
+        let (stop, changes) = (stop.fuse(), changes.fuse());
+        pin_mut!(camera_infos, feature_points, seconds, changes, stop);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
             select_biased! {
-                _ = signals.next() => break,
+                () = stop => break,
                 () = changes.select_next_some() => estimator.on_settings(update()),
                 sample = camera_infos.select_next_some() => match sample {
                     Ok((message, _)) => estimator.on_camera_info(&message),

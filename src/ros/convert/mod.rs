@@ -1,11 +1,15 @@
 //! Messages <-> plain types. Nothing is checked and nothing rounded: stamps pass as their two fields.
 
+mod tools;
+
 use std::time::Duration;
 
 use super::messages::{self, EstimatorStatus, Header, Time};
 use crate::camera;
 use crate::estimation::{Initialisation, Solution};
 use crate::pipeline::{Detection, DetectionFrame, FrameOutcome, Stamp};
+
+pub use tools::{camera_info_message, feature_points_message, isometry, pose_message};
 
 impl From<Time> for Stamp {
     fn from(time: Time) -> Self {
