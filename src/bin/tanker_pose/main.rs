@@ -1,7 +1,10 @@
 //! `tanker_pose`: tools around the node, one file a subcommand.
 
 mod options;
+mod ros_options;
+mod simulate;
 mod solve;
+mod terminal;
 
 use std::process::ExitCode;
 
@@ -19,13 +22,15 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Tool {
+    Simulate(simulate::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().tool {
-        Tool::Solve(arguments) => solve::run(&arguments),
+    let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().tool {
+        Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
+        Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,127 @@
+//! Which approach, seen by which camera.
+
+use std::fmt::{self, Display, Formatter};
+use std::path::PathBuf;
+
+use clap::Args;
+use tanker_pose::camera::{Camera, CameraError, CameraFileError, CameraInfo};
+use tanker_pose::simulation::{Approach, ApproachSettings};
+use tanker_pose::target::MarkerMap;
+
+use crate::options::{self, in_range};
+
+/// The camera of the paper, for those who name none.
+pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");
+
+/// What the approach looks like.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Approach")]
+pub struct ApproachOptions {
+    /// Beacons of the tanker: paper, fin6 or the path of a marker map
+    #[arg(long, value_name = "MAP", default_value = "paper")]
+    pub marker_map: String,
+    /// Calibration file as ROS's `camera_calibration` writes it; the paper's camera when missing
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// Distance ahead at the start, m
+    #[arg(long, value_name = "M", default_value_t = 60.0, value_parser = in_range::<100, 10_000_000>)]
+    start_range_m: f64,
+    /// Distance ahead at the end, m
+    #[arg(long, value_name = "M", default_value_t = 15.0, value_parser = in_range::<100, 10_000_000>)]
+    end_range_m: f64,
+    /// How long the approach takes, s
+    #[arg(long, value_name = "S", default_value_t = 25.0, value_parser = in_range::<1, 86_400_000>)]
+    duration_s: f64,
+    /// Images a second
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = in_range::<10, 1_000_000>)]
+    pub rate_hz: f64,
+    /// Noise of the detector on columns and rows, px; also what the detections state, and 0 states "not known"
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = in_range::<0, 100_000>)]
+    sigma_px: f64,
+    /// Amplitude of roll, pitch and yaw relative to the receiver, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = in_range::<0, 180_000>)]
+    attitude_deg: f64,
+    /// Seed of noise, motion and faults
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Why there is no such approach.
+#[derive(Debug, thiserror::Error)]
+pub enum ApproachError {
+    #[error("cannot use the marker map: {0}")]
+    MarkerMap(String),
+    #[error("cannot read the camera's calibration {}: {source}", path.display())]
+    CameraUnreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("cannot use the camera's calibration: {0}")]
+    CameraFile(#[from] CameraFileError),
+    #[error("cannot use the camera's calibration: {0}")]
+    Camera(#[from] CameraError),
+    #[error("expected at least one frame, but {duration_s} s at {rate_hz} Hz have none")]
+    NoFrame { duration_s: f64, rate_hz: f64 },
+}
+
+impl ApproachOptions {
+    /// Returns the approach, and the camera info that goes with it.
+    pub fn read(&self) -> Result<(Approach, CameraInfo), ApproachError> {
+        let info = match &self.camera {
+            None => CameraInfo::from_yaml(PAPER_CAMERA, "paper.yaml")?,
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|source| {
+                    ApproachError::CameraUnreadable {
+                        path: path.clone(),
+                        source,
+                    }
+                })?;
+                CameraInfo::from_yaml(&text, &path.display().to_string())?
+            }
+        };
+        let approach = Approach::new(
+            self.settings(),
+            Camera::from_info(&info, false)?,
+            self.map()?,
+        );
+        if approach.frame_count() == 0 {
+            return Err(ApproachError::NoFrame {
+                duration_s: self.duration_s,
+                rate_hz: self.rate_hz,
+            });
+        }
+        Ok((approach, info))
+    }
+
+    /// Returns the tanker's beacons.
+    pub fn map(&self) -> Result<MarkerMap, ApproachError> {
+        options::marker_map(&self.marker_map).map_err(ApproachError::MarkerMap)
+    }
+
+    const fn settings(&self) -> ApproachSettings {
+        ApproachSettings {
+            start_range_m: self.start_range_m,
+            end_range_m: self.end_range_m,
+            duration_s: self.duration_s,
+            rate_hz: self.rate_hz,
+            sigma_px: self.sigma_px,
+            attitude_deg: self.attitude_deg,
+            seed: self.seed,
+        }
+    }
+}
+
+impl Display for ApproachOptions {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        write!(
+            out,
+            "{} m to {} m in {} s at {} Hz, {} px, seed {}",
+            self.start_range_m,
+            self.end_range_m,
+            self.duration_s,
+            self.rate_hz,
+            self.sigma_px,
+            self.seed
+        )
+    }
+}

@@ -1,0 +1,221 @@
+//! `tanker_pose simulate`: a seeded approach, published as a camera and a detector would.
+
+mod approach_options;
+pub mod fault;
+mod pace;
+mod report;
+pub mod source;
+
+use std::time::{Duration, Instant};
+
+use async_signal::{Signal, Signals};
+use futures::StreamExt;
+use futures::future::{Either, select};
+use tanker_pose::ros::arguments::ArgumentError;
+use tanker_pose::ros::environment::{Environment, EnvironmentError};
+use tanker_pose::ros::logging;
+use tanker_pose::ros::names::NamesError;
+use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
+use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
+use tanker_pose::simulation::Approach;
+
+use crate::options::in_range;
+use crate::ros_options::RosOptions;
+pub use approach_options::{ApproachError, ApproachOptions};
+use fault::gross_error;
+pub use pace::Pace;
+use report::Report;
+use source::{Source, SourceError};
+
+/// What the node is called unless it is remapped.
+const NODE_NAME: &str = "tanker_simulation";
+/// For the last messages to leave, and to be asked for again.
+const LINGER: Duration = Duration::from_millis(200);
+
+/// Publish a simulated approach for a node to estimate.
+///
+/// Topics: `feature_points`, `camera_info` just before each, and the true pose as `geometry_msgs/PoseStamped` on
+/// `truth`. They are stamped with the time of publication. The same options give the same pixels every time.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Start again at the first frame after the last, until a signal
+    #[arg(long = "loop")]
+    repeat: bool,
+    /// Frame of the camera, x right, y down, z ahead
+    #[arg(long, value_name = "NAME", default_value = "camera")]
+    frame_id: String,
+    /// Wait at most so long for subscribers of `feature_points` and `camera_info`, s; then go on
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = in_range::<0, 86_400_000>)]
+    wait_s: f64,
+    /// Print one JSON object for every frame, and nothing else
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    ros: RosOptions,
+    // Headings hold for all that comes after them: from here on in this order.
+    /// Move one detection by --gross-error-px in every Nth frame; 0: never
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Faults")]
+    gross_error_every: u32,
+    /// How far, px
+    #[arg(long, value_name = "PX", default_value_t = 40.0, help_heading = "Faults", value_parser = in_range::<0, 10_000_000>)]
+    gross_error_px: f64,
+    #[command(flatten)]
+    approach: ApproachOptions,
+}
+
+/// Why the simulation cannot run.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulateError {
+    #[error(transparent)]
+    Approach(#[from] ApproachError),
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
+    Signals(std::io::Error),
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    #[error(transparent)]
+    Source(#[from] SourceError),
+}
+
+/// Publishes the approach until it ends, or until SIGINT or SIGTERM.
+pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
+    let ros_arguments = arguments.ros.read()?;
+    let environment = Environment::from_process()?;
+    let (approach, camera_info) = arguments.approach.read()?;
+    // From here on a signal is kept until it is read, and ends the node in good order.
+    let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(SimulateError::Signals)?;
+    let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, NodeOptions::new())?;
+    logging::start(&ros_arguments, ros.names());
+    for warning in &environment.warnings {
+        log::warn!("{warning}");
+    }
+    let length = (!arguments.repeat).then(|| approach.frame_count());
+    let report = Report::new(arguments.json, length, arguments.approach.rate_hz);
+    let result = introduce(&report, arguments, &ros, &environment)
+        .map_err(SimulateError::from)
+        .and_then(|()| {
+            let source = Source::open(&mut ros, &camera_info, &arguments.frame_id)?;
+            let mut simulation = Simulation {
+                arguments,
+                approach,
+                source,
+                report,
+            };
+            smol::block_on(simulation.run(&ros, &mut signals))
+        });
+    logging::stop_rosout();
+    ros.close();
+    result
+}
+
+fn introduce(
+    report: &Report,
+    arguments: &Arguments,
+    ros: &RosNode,
+    environment: &Environment,
+) -> Result<(), NamesError> {
+    let names = ros.names();
+    report.say(&format!(
+        "{} in domain {}: {}{}\npublishing {}, {}, {}",
+        names.fully_qualified(),
+        environment.domain_id,
+        arguments.approach,
+        if arguments.repeat {
+            ", again and again"
+        } else {
+            ""
+        },
+        names.topic(FEATURE_POINTS)?,
+        names.topic(CAMERA_INFO)?,
+        names.topic(source::TRUTH)?,
+    ));
+    Ok(())
+}
+
+struct Simulation<'a> {
+    arguments: &'a Arguments,
+    approach: Approach,
+    source: Source,
+    report: Report,
+}
+
+impl Simulation<'_> {
+    async fn run(&mut self, ros: &RosNode, signals: &mut Signals) -> Result<(), SimulateError> {
+        if self.wait(ros, signals).await {
+            self.publish(signals).await?;
+            smol::Timer::after(LINGER).await;
+        }
+        self.report.finish();
+        Ok(())
+    }
+
+    /// Waits for subscribers; returns whether to go on.
+    async fn wait(&mut self, ros: &RosNode, signals: &mut Signals) -> bool {
+        let patience = Duration::from_secs_f64(self.arguments.wait_s);
+        if patience.is_zero() {
+            return true;
+        }
+        self.report
+            .say("waiting for subscribers of feature_points and camera_info");
+        let heard = within(patience, self.source.wait_for_subscribers(ros));
+        match select(Box::pin(heard), signals.next()).await {
+            Either::Left((Some(()), _)) => {}
+            Either::Left((None, _)) => self.report.say(&format!(
+                "nobody listens to both feature_points and camera_info after {} s: going on all the same",
+                self.arguments.wait_s
+            )),
+            Either::Right(_) => return false,
+        }
+        true
+    }
+
+    async fn publish(&mut self, signals: &mut Signals) -> Result<(), SimulateError> {
+        let count = self.approach.frame_count();
+        let mut pace = Pace::new(self.arguments.approach.rate_hz, Instant::now());
+        for number in 0_u64.. {
+            if number >= u64::from(count) && !self.arguments.repeat {
+                break;
+            }
+            if let Some(late) = pace.make_up(number, Instant::now()) {
+                let late_s = late.as_secs_f64();
+                self.report
+                    .say(&format!("held up for {late_s:.1} s: going on from here"));
+            }
+            let due = smol::Timer::at(pace.due(number));
+            if let Either::Right(_) = select(due, signals.next()).await {
+                break;
+            }
+            // Below count, which is an u32.
+            let index = u32::try_from(number % u64::from(count)).unwrap_or(0);
+            self.publish_frame(number, index)?;
+        }
+        Ok(())
+    }
+
+    fn publish_frame(&mut self, number: u64, index: u32) -> Result<(), SimulateError> {
+        let mut frame = self.approach.frame(index);
+        let every = self.arguments.gross_error_every;
+        let fault = if every > 0 && (index + 1).is_multiple_of(every) {
+            gross_error(
+                &mut frame.detections,
+                self.arguments.gross_error_px,
+                self.arguments.approach.seed,
+                index,
+            )
+        } else {
+            None
+        };
+        let sent = self
+            .source
+            .publish(&frame.truth_camera_from_tanker, &frame.detections)?;
+        self.report.frame(number, &frame, fault, &sent);
+        Ok(())
+    }
+}
