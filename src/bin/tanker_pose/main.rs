@@ -1,5 +1,6 @@
 //! `tanker_pose`: tools around the node, one file a subcommand.
 
+mod demo;
 mod options;
 mod ros_options;
 mod simulate;
@@ -22,6 +23,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Tool {
+    Demo(demo::Arguments),
     Simulate(simulate::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
@@ -29,6 +31,7 @@ enum Tool {
 
 fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().tool {
+        Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
         Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
     };

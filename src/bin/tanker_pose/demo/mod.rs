@@ -1,0 +1,164 @@
+//! `tanker_pose demo`: the whole way over real DDS, measured against the truth.
+
+mod domain;
+mod flight;
+mod graph;
+mod ledger;
+mod live;
+mod node_thread;
+mod plan;
+mod statistics;
+mod summary;
+
+use std::time::Duration;
+
+use async_signal::{Signal, Signals};
+use tanker_pose::pipeline::OutcomeCode;
+use tanker_pose::ros::arguments::{ArgumentError, Arguments as RosArguments};
+use tanker_pose::ros::environment::EnvironmentError;
+use tanker_pose::ros::logging;
+use tanker_pose::ros::names::{NamesError, NodeNames};
+use tanker_pose::ros::node::{NODE_NAME, NodeError};
+use tanker_pose::ros::participant::{EndpointError, OpenError};
+
+use crate::options::in_range;
+use crate::simulate::source::SourceError;
+use crate::simulate::{ApproachError, ApproachOptions};
+use flight::{End, Flight};
+use graph::Graph;
+use ledger::Ledger;
+use live::Live;
+use node_thread::NodeThread;
+use summary::Summary;
+
+/// See it work: a simulated approach, the node, and its error against the truth.
+///
+/// The node is the real one, in a thread of this process; all messages go over real DDS on this host's loopback.
+/// In the middle, faults are injected on purpose. Positions and errors stand along the camera's axes: right, down,
+/// ahead. The exit code is 0 when every frame got an outcome: an estimate, or a refusal with its reason.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// DDS domain; when missing, that of `ROS_DOMAIN_ID`, or one from 50 to 99 that is free on this host
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
+    domain_id: Option<u16>,
+    /// Inject no faults
+    #[arg(long)]
+    no_faults: bool,
+    /// Wait at most so long for node and simulation to find each other, s
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = in_range::<100, 3_600_000>)]
+    wait_s: f64,
+    /// Print the summary as one JSON object, and nothing else
+    #[arg(long)]
+    json: bool,
+    /// Print the node's log too
+    #[arg(short, long)]
+    verbose: bool,
+    #[command(flatten)]
+    approach: ApproachOptions,
+}
+
+/// Why the demo cannot run, or did not go well.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    #[error(transparent)]
+    Approach(#[from] ApproachError),
+    #[error(transparent)]
+    Argument(#[from] ArgumentError),
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    #[error(
+        "every domain from {first} to {last} is in use on this host: choose one with --domain-id"
+    )]
+    NoFreeDomain { first: u16, last: u16 },
+    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
+    Signals(std::io::Error),
+    #[error("cannot start the node's thread: {0}")]
+    Thread(std::io::Error),
+    #[error("the node ended: {0}")]
+    Node(Box<NodeError>),
+    #[error("the node's thread ended by itself")]
+    NodeGone,
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error(
+        "domain {domain_id} already has a publisher of {topic}: choose another with --domain-id"
+    )]
+    DomainInUse { domain_id: u16, topic: &'static str },
+    #[error("node and simulation did not find each other within {wait_s} s: {reason}")]
+    Discovery { wait_s: f64, reason: String },
+    #[error("{missing} of {sent} frames got no outcome: is this machine overloaded?")]
+    Missing { missing: usize, sent: usize },
+}
+
+/// Runs the demo to its end, or until SIGINT or SIGTERM.
+pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
+    let (approach, camera_info) = arguments.approach.read()?;
+    let map = arguments.approach.map()?;
+    let environment = domain::environment(arguments.domain_id)?;
+    let ros_arguments = node_arguments(&arguments.approach.marker_map)?;
+    // From here on a signal is kept until it is read, and ends both nodes in good order.
+    let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(DemoError::Signals)?;
+    if arguments.verbose {
+        logging::start(&ros_arguments, &NodeNames::new(NODE_NAME, &[])?);
+    }
+    let mut live = Live::new(
+        arguments.json,
+        arguments.verbose,
+        &arguments.approach,
+        &approach,
+    );
+    live.introduce(&environment);
+
+    let faults_on = (!arguments.no_faults).then_some(&map);
+    let patience = Duration::from_secs_f64(arguments.wait_s);
+    let node = NodeThread::start(ros_arguments, environment.clone())?;
+    let mut flight = Flight::new(approach, &arguments.approach, faults_on, patience);
+    let flown = Graph::open(&environment, &camera_info).and_then(|mut graph| {
+        let flown = smol::block_on(graph.run(&mut flight, &mut live, &mut signals, &node));
+        graph.close();
+        flown
+    });
+    let node_ended = node.stop();
+    live.finish();
+    // Why the node ended says more than that it did.
+    let end = match flown {
+        Err(DemoError::NodeGone) => node_ended.and(Err(DemoError::NodeGone)),
+        flown => flown,
+    }?;
+    report(flight.ledger(), end, arguments.json)
+}
+
+fn report(ledger: &Ledger, end: End, json: bool) -> Result<(), DemoError> {
+    let interrupted = end == End::Interrupted;
+    if interrupted && ledger.sent() == 0 {
+        return Ok(());
+    }
+    let summary = Summary::new(ledger, interrupted);
+    summary.print(json);
+    match summary.missing() {
+        0 => Ok(()),
+        missing => Err(DemoError::Missing {
+            missing,
+            sent: ledger.sent(),
+        }),
+    }
+}
+
+/// What the node is told: as on its own command line, the defaults but for the marker map.
+fn node_arguments(marker_map: &str) -> Result<RosArguments, ArgumentError> {
+    let words = ["--ros-args", "-p"].map(str::to_owned);
+    // Quoted, so that a path that looks like a number stays text.
+    let marker_map = format!("marker_map:='{}'", marker_map.replace('\'', "''"));
+    Ok(RosArguments::split(&[&words[..], &[marker_map]].concat())?.0)
+}
+
+/// `UNKNOWN_ID` in words that need no manual.
+fn plainly(code: OutcomeCode) -> String {
+    code.name().to_ascii_lowercase().replace('_', " ")
+}
