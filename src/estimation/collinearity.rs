@@ -48,7 +48,7 @@ pub(crate) enum Weighting {
     /// The paper's object-space error, every point alike.
     ObjectSpace,
     /// The squared pixel residual over its variance, times the squared depth, to first order: the cost
-    /// of SQPnP (Terzakis, Lourakis, ECCV 2020), with a weight for each point.
+    /// of `SQPnP` (Terzakis, Lourakis, ECCV 2020), with a weight for each point.
     Image,
 }
 

@@ -243,14 +243,14 @@ fn globally(problem: &Problem) -> Result<Candidate, EstimateError> {
         match problem.fit(&minimum.rotation) {
             Ok(fit) => {
                 iterations = iterations.saturating_add(fit.iterations);
-                ranking.consider(fit, problem.merit(&fit));
+                ranking.consider(&fit, problem.merit(&fit));
             }
             Err(error) => failure = error,
         }
     }
     let (fit, _) = ranking.best.ok_or(failure)?;
     if let Some(rival) = ambiguity::rival(problem, &fit) {
-        ranking.consider(rival, problem.merit(&rival));
+        ranking.consider(&rival, problem.merit(&rival));
     }
     let (fit, _) = ranking.best.unwrap_or((fit, 0.0));
     Ok(Candidate {
@@ -269,17 +269,17 @@ struct Ranking {
 }
 
 impl Ranking {
-    fn consider(&mut self, fit: Fit, merit: f64) {
+    fn consider(&mut self, fit: &Fit, merit: f64) {
         match &self.best {
             Some((known, _)) if is_same(&known.pose.rotation, &fit.pose.rotation) => {}
             Some((_, best)) if *best <= merit => {
                 if self.rival.as_ref().is_none_or(|(_, rival)| merit < *rival) {
-                    self.rival = Some((fit, merit));
+                    self.rival = Some((*fit, merit));
                 }
             }
             _ => {
                 self.rival = self.best.take();
-                self.best = Some((fit, merit));
+                self.best = Some((*fit, merit));
             }
         }
     }

@@ -30,7 +30,8 @@ impl Factor {
                 l[j][k] *= inverse_d[k];
                 pivot -= ld[k] * l[j][k];
             }
-            if !(pivot > MIN_PIVOT_SHARE * a[j][j]) {
+            let is_free = pivot <= MIN_PIVOT_SHARE * a[j][j] || pivot.is_nan();
+            if is_free {
                 return None;
             }
             inverse_d[j] = 1.0 / pivot;

@@ -18,7 +18,7 @@ pub struct EstimatorOptions {
     #[arg(long, value_enum, default_value_t = Estimate::MaximumLikelihood)]
     refinement: Estimate,
     /// Standard deviation of pixels that bring none, px
-    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = within(1e-3, 1e3))]
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 1e3))]
     pub pixel_sigma_px: f64,
     /// Fewer points than this give no pose
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(3..))]
@@ -27,10 +27,10 @@ pub struct EstimatorOptions {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
     max_outliers: u8,
     /// Probability with which a correct frame passes the chi-squared test
-    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = within(0.0, 1.0))]
+    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = between(0.0, 1.0))]
     trust_probability: f64,
     /// Refuse a frame when a second pose is at least this likely; 1: never
-    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = within(0.0, 1.0))]
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = between(0.0, 1.0))]
     max_ambiguity: f64,
     /// Roll of the tanker relative to the camera's airframe in the nominal attitude, degrees
     #[arg(
@@ -120,7 +120,7 @@ pub fn marker_map(name_or_path: &str) -> Result<MarkerMap, String> {
 }
 
 /// Returns a parser of numbers within bounds.
-pub fn within(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+pub fn between(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text: &str| number(text, min, max)
 }
 

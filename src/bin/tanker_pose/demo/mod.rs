@@ -21,7 +21,7 @@ use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::{NODE_NAME, NodeError};
 use tanker_pose::ros::participant::{EndpointError, OpenError};
 
-use crate::options::in_range;
+use crate::options::between;
 use crate::simulate::source::SourceError;
 use crate::simulate::{ApproachError, ApproachOptions};
 use flight::{End, Flight};
@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     no_faults: bool,
     /// Wait at most so long for node and simulation to find each other, s
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = in_range::<100, 3_600_000>)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = between(0.1, 3600.0))]
     wait_s: f64,
     /// Print the summary as one JSON object, and nothing else
     #[arg(long)]

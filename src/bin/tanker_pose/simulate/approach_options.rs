@@ -8,7 +8,7 @@ use tanker_pose::camera::{Camera, CameraError, CameraFileError, CameraInfo};
 use tanker_pose::simulation::{Approach, ApproachSettings};
 use tanker_pose::target::MarkerMap;
 
-use crate::options::{self, in_range};
+use crate::options::{self, between};
 
 /// The camera of the paper, for those who name none.
 pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");
@@ -24,22 +24,22 @@ pub struct ApproachOptions {
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Distance ahead at the start, m
-    #[arg(long, value_name = "M", default_value_t = 60.0, value_parser = in_range::<100, 10_000_000>)]
+    #[arg(long, value_name = "M", default_value_t = 60.0, value_parser = between(0.1, 10000.0))]
     start_range_m: f64,
     /// Distance ahead at the end, m
-    #[arg(long, value_name = "M", default_value_t = 15.0, value_parser = in_range::<100, 10_000_000>)]
+    #[arg(long, value_name = "M", default_value_t = 15.0, value_parser = between(0.1, 10000.0))]
     end_range_m: f64,
     /// How long the approach takes, s
-    #[arg(long, value_name = "S", default_value_t = 25.0, value_parser = in_range::<1, 86_400_000>)]
+    #[arg(long, value_name = "S", default_value_t = 25.0, value_parser = between(0.001, 86400.0))]
     duration_s: f64,
     /// Images a second
-    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = in_range::<10, 1_000_000>)]
+    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = between(0.01, 1000.0))]
     pub rate_hz: f64,
     /// Noise of the detector on columns and rows, px; also what the detections state, and 0 states "not known"
-    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = in_range::<0, 100_000>)]
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(0.0, 100.0))]
     sigma_px: f64,
     /// Amplitude of roll, pitch and yaw relative to the receiver, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = in_range::<0, 180_000>)]
+    #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = between(0.0, 180.0))]
     attitude_deg: f64,
     /// Seed of noise, motion and faults
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -19,7 +19,7 @@ use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
 use tanker_pose::simulation::Approach;
 
-use crate::options::in_range;
+use crate::options::between;
 use crate::ros_options::RosOptions;
 pub use approach_options::{ApproachError, ApproachOptions};
 use fault::gross_error;
@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", default_value = "camera")]
     frame_id: String,
     /// Wait at most so long for subscribers of `feature_points` and `camera_info`, s; then go on
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = in_range::<0, 86_400_000>)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = between(0.0, 86400.0))]
     wait_s: f64,
     /// Print one JSON object for every frame, and nothing else
     #[arg(long)]
@@ -57,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Faults")]
     gross_error_every: u32,
     /// How far, px
-    #[arg(long, value_name = "PX", default_value_t = 40.0, help_heading = "Faults", value_parser = in_range::<0, 10_000_000>)]
+    #[arg(long, value_name = "PX", default_value_t = 40.0, help_heading = "Faults", value_parser = between(0.0, 10000.0))]
     gross_error_px: f64,
     #[command(flatten)]
     approach: ApproachOptions,
