@@ -220,7 +220,7 @@ pub enum EstimateError {
     },
     /// The best fit puts a marker behind the lens.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts marker {id} at depth {depth_m:.3e} m"
+        "expected every marker in front of the camera, but the best fit puts marker {id} at depth {depth_m:.1} m"
     )]
     BehindCamera {
         /// Its marker id.

@@ -88,7 +88,7 @@ pub enum Refusal {
     },
     /// The best fit is a mirror image.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.3e} m: ids exchanged, or a wrong detection?"
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.1} m: ids exchanged, or a wrong detection?"
     )]
     BehindCamera {
         /// Marker id.
