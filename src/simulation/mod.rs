@@ -5,8 +5,18 @@
 
 mod approach;
 mod bound;
+mod experiments;
+mod paper_axes;
 mod scene;
+mod statistics;
+mod trial;
 
 pub use approach::{Approach, ApproachSettings, SimulatedFrame};
 pub use bound::cramer_rao_bound;
+pub use experiments::{Experiment, Setting};
+pub use paper_axes::{
+    PAPER_COORDINATES, PAPER_UNITS, PaperBound, paper_bound, paper_coordinates, paper_error,
+};
 pub use scene::{Scene, paper_camera, paper_scene, pose_in_camera};
+pub use statistics::{FAILURE_DEG, Summary};
+pub use trial::{Method, Solver, Stop, TrialError, trial_generator};

@@ -1,0 +1,95 @@
+//! What explains the figures: failures, wrong minima, and how fast the iteration settles.
+
+use super::{Experiment, SIGMA_PX, Setting, paper_markers, pose_41, pose_42, scene};
+use crate::simulation::{Method, Stop};
+use crate::target::MarkerMap;
+
+/// The two starts of the iteration.
+const ITERATED_METHODS: &[Method] = &[Method::LinearIterated, Method::NominalIterated];
+
+impl Experiment {
+    /// How often each method fails at the poses of sections 4.1 and 4.2.
+    #[must_use]
+    pub fn minima() -> Self {
+        let poses = [("pose of 4.1", pose_41()), ("pose of 4.2", pose_42())];
+        let settings = poses
+            .into_iter()
+            .flat_map(|(name, pose)| {
+                [0.1, 0.25, 0.5, 1.0, 2.0].map(|sigma_px| {
+                    let scene = scene(paper_markers("paper"), pose);
+                    Setting::new(name, sigma_px, scene, sigma_px)
+                })
+            })
+            .collect();
+        Self {
+            name: "minima",
+            title: "Failures and wrong minima",
+            stream: 1,
+            abscissa: "sigma_px",
+            methods: &Method::ALL,
+            trials_factor: 10,
+            settings,
+        }
+    }
+
+    /// How many steps the iteration takes until a step turns by less than a tolerance.
+    #[must_use]
+    pub fn iterations() -> Self {
+        let settings = MarkerMap::shipped_names()
+            .flat_map(|name| {
+                [1e-10, 1e-6, 1e-3].map(|tolerance_rad| Setting {
+                    stop: Stop {
+                        tolerance_rad,
+                        ..Stop::CONVERGED
+                    },
+                    ..Setting::new(
+                        name,
+                        tolerance_rad,
+                        scene(paper_markers(name), pose_41()),
+                        SIGMA_PX,
+                    )
+                })
+            })
+            .collect();
+        Self {
+            name: "iterations",
+            title: "Steps of the iteration to a tolerance, 0.5 px, pose of 4.1",
+            stream: 2,
+            abscissa: "tolerance_rad",
+            methods: ITERATED_METHODS,
+            trials_factor: 1,
+            settings,
+        }
+    }
+
+    /// What an iteration is worth that is stopped after few steps.
+    #[must_use]
+    pub fn stopped() -> Self {
+        let settings = [0.25, 0.5, 1.0]
+            .into_iter()
+            .flat_map(|sigma_px| {
+                [0_u32, 1, 2, 5, 10, 20, 50, 100].map(|max_iterations| Setting {
+                    stop: Stop {
+                        tolerance_rad: 0.0,
+                        max_iterations,
+                    },
+                    ..Setting::new(
+                        format!("{sigma_px} px"),
+                        f64::from(max_iterations),
+                        scene(paper_markers("paper"), pose_41()),
+                        sigma_px,
+                    )
+                })
+            })
+            .collect();
+        Self {
+            name: "stopped",
+            title: "The iteration stopped after few steps, pose of 4.1",
+            stream: 3,
+            abscissa: "iterations",
+            methods: ITERATED_METHODS,
+            trials_factor: 1,
+            settings,
+        }
+    }
+}

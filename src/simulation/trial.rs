@@ -1,0 +1,269 @@
+//! One noisy image of a scene, solved by the paper's methods and by ours: the step that Monte Carlo repeats.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Vector6};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Scene, paper_error};
+use crate::camera::{Camera, Ray};
+use crate::estimation::{
+    EstimateError, Estimator, EstimatorSettings, Iterated, Observation, iterate_accelerated,
+    linear_rotation,
+};
+use crate::geometry::optical_from_body;
+
+/// rad; two ends of an iteration closer than this are the same minimum.
+const SAME_MINIMUM: f64 = 1e-4;
+
+/// A way to a pose that the paper's experiments compare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// `In_M1` alone: rotation from the linear camera matrix, translation by Eq. (13).
+    LinearAlone,
+    /// `In_M1` + OI.
+    LinearIterated,
+    /// `In_M2` + OI.
+    NominalIterated,
+    /// Ours: maximum likelihood, from the nominal attitude.
+    MaximumLikelihood,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 4] = [
+        Self::LinearAlone,
+        Self::LinearIterated,
+        Self::NominalIterated,
+        Self::MaximumLikelihood,
+    ];
+
+    /// Returns whether it ends with the orthogonal iteration.
+    #[must_use]
+    pub fn iterates(self) -> bool {
+        matches!(self, Self::LinearIterated | Self::NominalIterated)
+    }
+
+    /// Returns its name, the paper's where it has one.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LinearAlone => "In_M1",
+            Self::LinearIterated => "In_M1+OI",
+            Self::NominalIterated => "In_M2+OI",
+            Self::MaximumLikelihood => "ML",
+        }
+    }
+}
+
+/// When the orthogonal iteration ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// rad; a step that turns less is the last.
+    pub tolerance_rad: f64,
+    /// No more steps than this.
+    pub max_iterations: u32,
+}
+
+impl Stop {
+    /// The fixed point, for all that the statistics can see.
+    pub const CONVERGED: Self = Self {
+        tolerance_rad: 1e-10,
+        max_iterations: 20_000,
+    };
+
+    /// No step: the position that belongs to the start.
+    const AT_ONCE: Self = Self {
+        tolerance_rad: 0.0,
+        max_iterations: 0,
+    };
+}
+
+/// What one method made of one image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrialError {
+    /// Found minus true, paper's coordinates, degrees and metres.
+    pub coordinates: Vector6<f64>,
+    /// Angle between found and true attitude, degrees.
+    pub rotation_deg: f64,
+    /// Distance between found and true position, m.
+    pub position_m: f64,
+    /// Steps of the orthogonal iteration; 0 for methods without.
+    pub iterations: u32,
+    /// Whether the iteration ended elsewhere than the same iteration started at the truth; none for a
+    /// method without iteration, and for one that is stopped before it settles.
+    pub other_minimum: Option<bool>,
+}
+
+/// The methods, ready to solve.
+#[derive(Debug, Clone)]
+pub struct Solver {
+    maximum_likelihood: Estimator,
+}
+
+/// Returns the generator of one trial: its own stream, so the order and place of the trials do not matter.
+///
+/// # Inputs
+/// * `experiment`, `setting`: below 2¹⁶ each; they and the trial are the stream, `seed` is the key.
+#[must_use]
+pub fn trial_generator(seed: u64, experiment: u16, setting: u16, trial: u32) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random
+        .set_stream((u64::from(experiment) << 48) | (u64::from(setting) << 32) | u64::from(trial));
+    random
+}
+
+impl Default for Solver {
+    /// Aligned airframes are the nominal attitude; no point is left out as wrong.
+    fn default() -> Self {
+        Self {
+            maximum_likelihood: Estimator::new(EstimatorSettings::default()),
+        }
+    }
+}
+
+impl Solver {
+    /// Returns the pose and the steps of the orthogonal iteration.
+    ///
+    /// # Errors
+    /// Any [`EstimateError`]. The paper's methods do not test that the tanker lies in front of the camera.
+    pub fn solve(
+        &self,
+        method: Method,
+        camera: &Camera,
+        observations: &[Observation],
+        stop: Stop,
+    ) -> Result<(Isometry3<f64>, u32), EstimateError> {
+        let iterated = match method {
+            Method::MaximumLikelihood => {
+                let solution = self
+                    .maximum_likelihood
+                    .estimate(camera, observations, None)?;
+                return Ok((solution.camera_from_tanker, 0));
+            }
+            Method::NominalIterated => {
+                Frame::new(camera, observations)?.iterate_from(&optical_from_body(), stop)?
+            }
+            Method::LinearAlone | Method::LinearIterated => {
+                let frame = Frame::new(camera, observations)?;
+                let seed = linear_rotation(&frame.rays, &frame.markers)?;
+                let stop = match method {
+                    Method::LinearAlone => Stop::AT_ONCE, // only Eq. (13)
+                    _ => stop,
+                };
+                frame.iterate_from(&seed, stop)?
+            }
+        };
+        Ok((iterated.camera_from_tanker, iterated.iterations))
+    }
+
+    /// Returns the error of each method on the same noisy image; none where a method gives no pose.
+    pub fn trial(
+        &self,
+        scene: &Scene,
+        sigma_px: f64,
+        stop: Stop,
+        methods: &[Method],
+        random: &mut impl Rng,
+    ) -> Vec<Option<TrialError>> {
+        let observations = scene.noisy_observations(sigma_px, random);
+        let settles = stop == Stop::CONVERGED && methods.iter().any(|m| m.iterates());
+        let from_truth = settles
+            .then(|| {
+                Frame::new(scene.camera(), &observations)?
+                    .iterate_from(&scene.truth_rotation(), stop)
+            })
+            .and_then(Result::ok);
+        methods
+            .iter()
+            .map(|&method| {
+                let (found, iterations) = self
+                    .solve(method, scene.camera(), &observations, stop)
+                    .ok()?;
+                let truth = scene.truth_camera_from_tanker();
+                let is_elsewhere = |end: Iterated| {
+                    end.camera_from_tanker.rotation.angle_to(&found.rotation) > SAME_MINIMUM
+                };
+                let end = from_truth.filter(|_| method.iterates());
+                Some(TrialError {
+                    coordinates: paper_error(truth, &found),
+                    rotation_deg: truth.rotation.angle_to(&found.rotation).to_degrees(),
+                    position_m: (truth.translation.vector - found.translation.vector).norm(),
+                    iterations,
+                    other_minimum: end.map(is_elsewhere),
+                })
+            })
+            .collect()
+    }
+}
+
+/// An image as the orthogonal iteration takes it.
+struct Frame {
+    rays: Vec<Ray>,
+    markers: Vec<Point3<f64>>,
+}
+
+impl Frame {
+    fn new(camera: &Camera, observations: &[Observation]) -> Result<Self, EstimateError> {
+        let rays = observations
+            .iter()
+            .map(|seen| {
+                camera
+                    .ray_from_pixel(seen.pixel)
+                    .map_err(|cause| EstimateError::NoRay { id: seen.id, cause })
+            })
+            .collect::<Result<_, _>>()?;
+        let markers = observations.iter().map(|o| o.marker_in_tanker).collect();
+        Ok(Self { rays, markers })
+    }
+
+    fn iterate_from(&self, seed: &Rotation3<f64>, stop: Stop) -> Result<Iterated, EstimateError> {
+        iterate_accelerated(
+            &self.rays,
+            &self.markers,
+            seed,
+            stop.tolerance_rad,
+            stop.max_iterations,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::paper_scene;
+
+    #[test]
+    fn with_almost_no_noise_every_method_finds_the_truth() {
+        let mut random = trial_generator(1, 0, 0, 0);
+        let errors = Solver::default().trial(
+            &paper_scene(),
+            1e-6,
+            Stop::CONVERGED,
+            &Method::ALL,
+            &mut random,
+        );
+        for (method, error) in Method::ALL.iter().zip(errors) {
+            let error = error.expect("a pose");
+            assert!(
+                error.rotation_deg < 1e-3 && error.position_m < 1e-3,
+                "{method:?}: {error:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn trials_have_streams_of_their_own() {
+        use rand::RngExt;
+        let first = |e, s, t| trial_generator(1, e, s, t).random::<u64>();
+        let firsts = [
+            first(0, 0, 0),
+            first(1, 0, 0),
+            first(0, 1, 0),
+            first(0, 0, 1),
+        ];
+        for (i, a) in firsts.iter().enumerate() {
+            assert!(firsts[i + 1..].iter().all(|b| a != b));
+        }
+        assert_eq!(first(2, 3, 4), first(2, 3, 4));
+    }
+}
