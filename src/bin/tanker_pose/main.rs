@@ -2,6 +2,7 @@
 
 mod demo;
 mod options;
+mod reproduce;
 mod ros_options;
 mod simulate;
 mod solve;
@@ -27,6 +28,8 @@ enum Tool {
     Simulate(simulate::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
+    /// Reproduce the paper's experiments: tables and plots
+    Reproduce(reproduce::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -34,6 +37,7 @@ fn main() -> ExitCode {
         Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
         Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
+        Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
