@@ -29,7 +29,7 @@ pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     let pose = &chosen.pose;
     let normal = smallest_axis(&problem.points.scatter)?;
     let start = mirrored(&pose.rotation, &pose.centre_in_camera, &normal);
-    let minimum = problem.descend(&start).ok()?;
+    let minimum = problem.descend_below(&start, chosen.chi_squared + NEGLIGIBLE)?;
     let is_negligible = problem
         .least_chi_squared(&minimum)
         .is_some_and(|least| least > chosen.chi_squared + NEGLIGIBLE);

@@ -23,6 +23,11 @@ const MAX_HALVINGS: usize = 14;
 /// rad; a shorter step is in the quadratic regime, where the cost is too flat to tell its descent from rounding.
 const TRUSTED_STEP: f64 = 1e-4;
 
+/// rad; the quadratic model is asked how far down a longer step would lead, but not believed.
+const PROMISING_STEP: f64 = 0.3;
+/// How often the promised minimum must exceed a limit to give a descent up.
+const HOPELESS: f64 = 5.0;
+
 /// Returns the local minimum of `E(R)` in whose basin `seed` lies.
 ///
 /// It stops after a step shorter than `step_tolerance` (rad); convergence is quadratic, so the
@@ -36,11 +41,30 @@ pub(crate) fn minimise(
     seed: &Rotation3<f64>,
     step_tolerance: f64,
 ) -> Minimum {
+    minimise_below(cost, seed, step_tolerance, f64::INFINITY).unwrap_or(Minimum {
+        rotation: *seed,
+        cost: f64::INFINITY,
+        iterations: 0,
+        converged: false,
+    })
+}
+
+/// Returns the same as [`minimise`], or none as soon as the minimum will clearly lie above `limit`:
+/// where a full Newton step promises to end [`HOPELESS`] times higher.
+pub(crate) fn minimise_below(
+    cost: &CollinearityCost,
+    seed: &Rotation3<f64>,
+    step_tolerance: f64,
+    limit: f64,
+) -> Option<Minimum> {
     let mut rotation = *seed;
     let mut y = cost.half_gradient(&rotation);
     let mut value = rotation.matrix().dot(&y);
     for iteration in 1..=MAX_ITERATIONS {
-        let mut step = newton_step(cost, &rotation, &y);
+        let NewtonStep { mut step, promise } = newton_step(cost, &rotation, &y);
+        if promise.is_some_and(|gain| value - gain > HOPELESS * limit) {
+            return None;
+        }
         let mut halvings = 0;
         loop {
             let trial = rotation * cayley(step);
@@ -52,70 +76,91 @@ pub(crate) fn minimise(
             }
             halvings += 1;
             if halvings > MAX_HALVINGS {
-                return Minimum {
+                return Some(Minimum {
                     rotation,
                     cost: value,
                     iterations: iteration,
                     converged: false,
-                };
+                });
             }
             step *= 0.5;
         }
         if step.norm() < step_tolerance {
-            return Minimum {
+            return Some(Minimum {
                 rotation,
                 cost: value,
                 iterations: iteration,
                 converged: true,
-            };
+            });
         }
     }
-    Minimum {
+    Some(Minimum {
         rotation,
         cost: value,
         iterations: MAX_ITERATIONS,
         converged: false,
-    }
+    })
+}
+
+/// A step, and by how much the quadratic model says it lowers the cost; no promise where that model
+/// has no minimum near.
+struct NewtonStep {
+    step: Vector3<f64>,
+    promise: Option<f64>,
 }
 
 #[inline]
-fn newton_step(
-    cost: &CollinearityCost,
-    rotation: &Rotation3<f64>,
-    y: &Matrix3<f64>,
-) -> Vector3<f64> {
+fn newton_step(cost: &CollinearityCost, rotation: &Rotation3<f64>, y: &Matrix3<f64>) -> NewtonStep {
     let r = rotation.matrix();
     let a = r.tr_mul(y);
     let gradient = axial(&a);
     let hessian =
         cost.curvature(rotation) + (a + a.transpose()) * 0.5 - Matrix3::identity() * a.trace();
-    let step = -solve_damped(&hessian, &gradient);
+    let (step, is_convex) = match solve_positive(&hessian, &gradient) {
+        Some(solution) => (-solution, true),
+        None => (-solve_lifted(&hessian, &gradient), false),
+    };
     let length = step.norm();
+    let promise = (is_convex && length < PROMISING_STEP).then(|| -step.dot(&gradient));
     if length > MAX_STEP {
-        step * (MAX_STEP / length)
+        NewtonStep {
+            step: step * (MAX_STEP / length),
+            promise,
+        }
     } else {
-        step
+        NewtonStep { step, promise }
     }
 }
 
-/// Solves with the Hessian, lifted until it is positive definite so that the step descends.
-fn solve_damped(hessian: &Matrix3<f64>, gradient: &Vector3<f64>) -> Vector3<f64> {
-    let mut lifted = *hessian;
-    let scale = hessian.norm().max(f64::MIN_POSITIVE);
-    let mut lift = 0.0;
-    loop {
-        if let Some(factor) = lifted.cholesky() {
-            return factor.solve(gradient);
-        }
-        // Doubling ends at the latest when the lift exceeds the matrix norm.
-        lift = if lift == 0.0 {
-            0.01 * scale
-        } else {
-            2.0 * lift
-        };
-        if lift > 8.0 * scale || !lift.is_finite() {
-            return gradient / scale;
-        }
-        lifted = hessian + Matrix3::identity() * lift;
+/// Returns `H⁻¹ g` by `L D Lᵀ`; none unless the matrix is positive definite.
+#[inline]
+fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let d1 = h.m11;
+    let (l21, l31) = (h.m21 / d1, h.m31 / d1);
+    let d2 = h.m22 - l21 * h.m21;
+    let v32 = h.m32 - l31 * h.m21;
+    let l32 = v32 / d2;
+    let d3 = h.m33 - l31 * h.m31 - l32 * v32;
+    if !(d1 > 0.0 && d2 > 0.0 && d3 > 0.0) {
+        return None;
     }
+    let y2 = g.y - l21 * g.x;
+    let y3 = g.z - l31 * g.x - l32 * y2;
+    let z = y3 / d3;
+    let y = y2 / d2 - l32 * z;
+    Some(Vector3::new(g.x / d1 - l21 * y - l31 * z, y, z))
+}
+
+/// Solves with the Hessian, lifted until it is positive definite so that the step descends.
+fn solve_lifted(hessian: &Matrix3<f64>, gradient: &Vector3<f64>) -> Vector3<f64> {
+    let scale = hessian.norm().max(f64::MIN_POSITIVE);
+    let mut lift = 0.01 * scale;
+    // Doubling ends at the latest when the lift exceeds the matrix norm.
+    while lift <= 8.0 * scale {
+        if let Some(solution) = solve_positive(&(hessian + Matrix3::identity() * lift), gradient) {
+            return solution;
+        }
+        lift *= 2.0;
+    }
+    gradient / scale
 }

@@ -69,6 +69,24 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Returns the minimum in whose basin `seed` lies; none when there is none, or when chi-squared
+    /// there will clearly exceed a limit.
+    pub(crate) fn descend_below(
+        &self,
+        seed: &Rotation3<f64>,
+        chi_squared: f64,
+    ) -> Option<newton::Minimum> {
+        let limit = match self.refinement {
+            Refinement::None => f64::INFINITY,
+            Refinement::MaximumLikelihood => {
+                let depth = self.cost.centre_in_camera(seed).z.abs() + self.points.radius;
+                chi_squared * depth * depth
+            }
+        };
+        newton::minimise_below(&self.cost, seed, self.step_tolerance(), limit)
+            .filter(|minimum| minimum.converged)
+    }
+
     /// Returns the final pose from a minimum of the cost, every point in front of the camera.
     pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
         let start = CentredPose {
