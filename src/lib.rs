@@ -25,4 +25,5 @@ pub mod pipeline;
 pub mod ros;
 pub mod simulation;
 pub mod target;
+mod text;
 pub mod yaml;

@@ -1,5 +1,7 @@
 //! Why a camera info can't be used, and why a pixel has no ray.
 
+use crate::text::{clip, list};
+
 /// Why a camera info cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -51,14 +53,22 @@ pub enum CameraError {
     )]
     Baseline { index: usize, value: f64 },
     /// A lens that we have no formula for.
-    #[error("distortion model `{model}` with d = {d:?} is not known; known are {known}")]
+    #[error(
+        "distortion model `{}` with d = [{}] is not known; known are {known}",
+        clip(model),
+        list(d)
+    )]
     UnknownDistortionModel {
         model: String,
         d: Vec<f64>,
         known: &'static str,
     },
     /// More or fewer coefficients than the lens model has.
-    #[error("distortion model `{model}` needs {need} coefficients, got {got}: d = {d:?}")]
+    #[error(
+        "distortion model `{}` needs {need} coefficients, got {got}: d = [{}]",
+        clip(model),
+        list(d)
+    )]
     CoefficientCount {
         model: String,
         need: &'static str,

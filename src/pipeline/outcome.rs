@@ -4,6 +4,7 @@ use crate::camera::CameraError;
 use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
 
 use super::Stamp;
+use crate::text::{clip, list};
 
 /// Why a frame gives no pose. Each says what was expected and what came.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -16,7 +17,7 @@ pub enum Refusal {
     #[error("the latest camera_info cannot be used: {0}")]
     InvalidCameraInfo(CameraError),
     /// The detections belong to another camera frame, or do not say to which.
-    #[error("expected detections in the frame of camera_info, '{expected}', got frame_id '{got}'{}", if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
+    #[error("expected detections in the frame of camera_info, '{}', got frame_id '{}'{}", clip(expected), clip(got), if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
     FrameMismatch {
         /// `frame_id` of the camera info.
         expected: String,
@@ -27,7 +28,7 @@ pub enum Refusal {
     #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
     InvalidStamp(Stamp),
     /// An id that is not on the tanker.
-    #[error("expected ids of the marker map, got unknown id {}", join(ids))]
+    #[error("expected ids of the marker map, got unknown id {}", list(ids))]
     UnknownId {
         /// All such ids of the frame.
         ids: Vec<u32>,
@@ -215,11 +216,4 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
             limit: settings.max_ambiguity,
         },
     )
-}
-
-fn join(ids: &[u32]) -> String {
-    ids.iter()
-        .map(u32::to_string)
-        .collect::<Vec<_>>()
-        .join(", ")
 }
