@@ -81,3 +81,10 @@ DISTORT = {
     "rational_polynomial": rational_polynomial,
     "equidistant": equidistant,
 }
+
+# One lens of each kind, bent by many pixels at the border of the paper's image.
+LENSES: dict[str, tuple[float, ...]] = {
+    "plumb_bob": (-0.28, 0.09, 0.0008, -0.0005, -0.012),
+    "rational_polynomial": (0.35, -0.12, 0.0006, -0.0004, 0.02, 0.62, -0.05, 0.03),
+    "equidistant": (-0.02, 0.006, -0.003, 0.0005),
+}

@@ -8,7 +8,7 @@ from sensor_msgs.msg import CameraInfo, RegionOfInterest
 from tanker_pose.msg import FeaturePointArray
 
 from harness import messages, paper
-from harness.camera_model import Camera
+from harness.camera_model import LENSES, Camera
 from harness.conftest import StartEstimator
 from harness.consistency import pose_error
 from harness.estimator import Answer, Estimator
@@ -16,12 +16,6 @@ from harness.messages import pose_of
 
 # As in test_estimation: well inside what a thousandth of a standard deviation amounts to.
 EXACT = 3e-4
-
-LENSES = {
-    "plumb_bob": (-0.28, 0.09, 0.0008, -0.0005, -0.012),
-    "rational_polynomial": (0.35, -0.12, 0.0006, -0.0004, 0.02, 0.62, -0.05, 0.03),
-    "equidistant": (-0.02, 0.006, -0.003, 0.0005),
-}
 
 
 def error_of(answer: Answer) -> float:

@@ -1,55 +1,14 @@
 """`tanker_pose solve` through a pipe: a JSON line in, a JSON line out, whatever the line holds."""
 
 import json
-import subprocess
-from typing import Any
 
 import numpy as np
 
 from harness import paper
 from harness.consistency import cramer_rao_covariance, nees, pose_error
-from harness.processes import binary, child_environment
-from harness.rotations import Array, Pose
+from harness.solver import pose_in, request, solve
 
 EXACT = 3e-4
-
-
-def request(number: int, pixels: Array, sigma: float = 0.5) -> dict[str, Any]:
-    """A frame of the paper's camera and markers, as a line of input holds it."""
-    camera = paper.CAMERA
-    return {
-        "id": number,
-        "camera": {
-            "width": camera.width,
-            "height": camera.height,
-            "distortion_model": camera.model,
-            "d": list(camera.d),
-            "k": [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1],
-        },
-        "points": [
-            {"id": marker, "x": x, "y": y, "z": z, "u": float(u), "v": float(v), "sigma": sigma}
-            for (marker, (x, y, z)), (u, v) in zip(paper.MARKERS.items(), pixels, strict=True)
-        ],
-    }
-
-
-def solve(*lines: str, arguments: tuple[str, ...] = ()) -> list[dict[str, Any]]:
-    """The answers to the given input lines."""
-    result = subprocess.run(
-        [binary("tanker_pose"), "solve", *arguments],
-        input="".join(f"{line}\n" for line in lines),
-        env=child_environment(),
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return [json.loads(line) for line in result.stdout.splitlines()]
-
-
-def pose_in(answer: dict[str, Any]) -> Pose:
-    return Pose(np.array(answer["rotation"]).reshape(3, 3), np.array(answer["translation"]))
 
 
 def test_an_exact_frame_is_solved_exactly() -> None:
