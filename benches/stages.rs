@@ -1,0 +1,166 @@
+//! How long our own stages take, one frame each: `cargo bench`, or `cargo bench -- estimate` for a part.
+//!
+//! Comparisons with other solvers are in `benches/peers`.
+
+#![allow(missing_docs)] // of the functions that criterion's macros make
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::{Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tanker_pose::camera::{Camera, CameraInfo, Pixel, Ray};
+use tanker_pose::estimation::{
+    Estimator, EstimatorSettings, Initialisation, Observation, Refinement, fixed_point,
+    iterate_accelerated, iterate_literally,
+};
+use tanker_pose::geometry::optical_from_body;
+use tanker_pose::simulation::{Scene, paper_camera, paper_scene, pose_in_camera};
+use tanker_pose::target::Marker;
+
+const SIGMA_PX: f64 = 0.5;
+
+fn plumb_bob_camera() -> Camera {
+    let info = CameraInfo {
+        width: 508,
+        height: 412,
+        distortion_model: "plumb_bob".to_owned(),
+        d: vec![-0.28, 0.09, 0.0008, -0.0005, -0.012],
+        k: [571.0, 0.0, 254.0, 0.0, 571.0, 206.0, 0.0, 0.0, 1.0],
+        ..CameraInfo::default()
+    };
+    Camera::from_info(&info, false).expect("a usual lens")
+}
+
+/// A noisy frame 20 m ahead: the paper's markers, or random ones in the tanker's volume.
+fn frame(camera: Camera, count: u32) -> (Camera, Vec<Observation>) {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let pose = pose_in_camera(Vector3::new(20.0, 0.0, 6.0), 3.0, 2.0, -3.0);
+    let markers = if count == 6 {
+        paper_scene().markers().to_vec()
+    } else {
+        (1..=count)
+            .map(|id| Marker {
+                id,
+                marker_in_tanker: Point3::new(
+                    random.random_range(0.0..8.0),
+                    random.random_range(-7.0..7.0),
+                    random.random_range(0.0..3.2),
+                ),
+            })
+            .collect()
+    };
+    let scene = Scene::with_markers(camera, markers, pose);
+    let seen = scene.noisy_observations(SIGMA_PX, &mut random);
+    (scene.camera().clone(), seen)
+}
+
+fn rays(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("ray_from_pixel");
+    for (lens, camera) in [
+        ("pinhole", paper_camera()),
+        ("plumb_bob", plumb_bob_camera()),
+    ] {
+        let pixel = Pixel { u: 430.0, v: 120.0 };
+        group.bench_function(lens, |bencher| {
+            bencher.iter(|| camera.ray_from_pixel(black_box(pixel)));
+        });
+    }
+}
+
+fn estimates(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("estimate");
+    for (name, initialisation, refinement) in [
+        (
+            "prior",
+            Initialisation::Nominal,
+            Refinement::MaximumLikelihood,
+        ),
+        ("prior_unrefined", Initialisation::Nominal, Refinement::None),
+        (
+            "global",
+            Initialisation::Global,
+            Refinement::MaximumLikelihood,
+        ),
+    ] {
+        let estimator = Estimator::new(EstimatorSettings {
+            initialisation,
+            refinement,
+            ..Default::default()
+        });
+        for count in [6, 100, 1000] {
+            let (camera, seen) = frame(paper_camera(), count);
+            group.bench_function(BenchmarkId::new(name, count), |bencher| {
+                bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
+            });
+        }
+    }
+    let (camera, seen) = frame(plumb_bob_camera(), 6);
+    let estimator = Estimator::new(EstimatorSettings::default());
+    group.bench_function(BenchmarkId::new("prior_plumb_bob", 6), |bencher| {
+        bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
+    });
+}
+
+/// One detection is 40 px off: all points fail the test, then every subset is tried.
+fn exclusion(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("one_gross_error");
+    for max_outliers in [1, 2] {
+        let estimator = Estimator::new(EstimatorSettings {
+            max_outliers,
+            ..Default::default()
+        });
+        for count in [6, 12] {
+            let (camera, mut seen) = frame(paper_camera(), count);
+            seen[2].pixel.u += 40.0;
+            let solution = estimator.estimate(&camera, &seen, None);
+            assert!(solution.is_ok_and(|s| s.excluded.contains(seen[2].id)));
+            let id = BenchmarkId::new(format!("at_most_{max_outliers}"), count);
+            group.bench_function(id, |bencher| {
+                bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
+            });
+        }
+    }
+}
+
+fn orthogonal_iteration(criterion: &mut Criterion) {
+    const TOLERANCE_RAD: f64 = 1e-6;
+    const MAX_ITERATIONS: u32 = 1000;
+    let mut group = criterion.benchmark_group("orthogonal_iteration");
+    let (camera, seen) = frame(paper_camera(), 6);
+    let rays: Vec<Ray> = seen
+        .iter()
+        .map(|o| camera.ray_from_pixel(o.pixel).expect("a pinhole"))
+        .collect();
+    let markers: Vec<Point3<f64>> = seen.iter().map(|o| o.marker_in_tanker).collect();
+    let seed = optical_from_body();
+    group.bench_function("literal", |bencher| {
+        bencher.iter(|| {
+            iterate_literally(
+                black_box(&rays),
+                &markers,
+                &seed,
+                TOLERANCE_RAD,
+                MAX_ITERATIONS,
+            )
+        });
+    });
+    group.bench_function("accelerated", |bencher| {
+        bencher.iter(|| {
+            iterate_accelerated(
+                black_box(&rays),
+                &markers,
+                &seed,
+                TOLERANCE_RAD,
+                MAX_ITERATIONS,
+            )
+        });
+    });
+    group.bench_function("newton", |bencher| {
+        bencher.iter(|| fixed_point(black_box(&rays), &markers, &seed));
+    });
+}
+
+criterion_group!(stages, rays, estimates, exclusion, orthogonal_iteration);
+criterion_main!(stages);
