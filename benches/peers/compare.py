@@ -247,7 +247,7 @@ def page(
     times: dict[str, Array],
     found: dict[tuple[str, int], Accuracy],
     points: list[int],
-    frames: int,
+    counts: list[int],
 ) -> str:
     rounds = next(iter(times.values())).shape[1]
     # A peer that was not measured is named, not passed over.
@@ -261,7 +261,7 @@ def page(
         .replace("@SUMMARY@", "\n".join(summary(times, points)))
         .replace("@TABLES@", "\n".join(tables).rstrip())
         .replace("@WRONG@", f"{WRONG_RAD:g} rad")
-        .replace("@FRAMES@", str(frames))
+        .replace("@FRAMES@", ", ".join(str(count) for count in counts))
         .replace("@ROUNDS@", str(rounds))
         .replace("@CPU@", cpu())
         .replace("@DATE@", f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d}")
@@ -288,7 +288,7 @@ def main() -> None:
         for size, frames in enumerate(sizes)
     }
     times = measure(workers, len(sizes), arguments.rounds)
-    text = page(workers, times, found, points, len(sizes[0]))
+    text = page(workers, times, found, points, [len(frames) for frames in sizes])
     for worker in workers:
         worker.close()
     arguments.output.write_text(text, encoding="utf-8")

@@ -1,8 +1,8 @@
-"""`tanker_pose solve` against solvers of others on the same distorted frames, to the numerical limit.
+"""`tanker_pose solve` against the solvers of others on the same distorted frames.
 
 OpenCV weighs all points alike and has no fisheye in `solvePnP`; SciPy, on the camera models of
-`camera_model.py`, has both. Their limits are set so tight that what remains is our own: the refinement
-stops when a step promises to lower chi-squared by less than 1e-6, a thousandth of a standard deviation.
+`camera_model.py`, has both. Their limits are so tight that what remains is our own: the refinement
+stops when a step promises to lower chi-squared by less than 1e-6, a thousandth of a sigma.
 """
 
 import json

@@ -12,10 +12,8 @@ use tanker_pose::geometry::optical_from_body;
 use tanker_pose::simulation::{Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::{Marker, MarkerMap};
 
-/// Points of a frame.
-pub const SIZES: [u32; 5] = [6, 12, 64, 100, 1000];
-/// Frames of each size.
-pub const FRAMES: usize = 128;
+/// Points of a frame, and how many such frames.
+const SIZES: [(u32, usize); 5] = [(6, 128), (12, 128), (64, 128), (100, 128), (1000, 32)];
 /// px.
 const SIGMA_PX: f64 = 0.5;
 const SEED: u64 = 1;
@@ -30,12 +28,12 @@ pub struct Frame {
     pub prior_camera_from_tanker: Isometry3<f64>,
 }
 
-/// Returns the frames of every size, in the order of [`SIZES`].
+/// Returns the frames of every size, in the order of `SIZES`.
 pub fn all() -> Vec<Vec<Frame>> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     SIZES
         .iter()
-        .map(|&size| (0..FRAMES).map(|_| frame(size, &mut random)).collect())
+        .map(|&(size, count)| (0..count).map(|_| frame(size, &mut random)).collect())
         .collect()
 }
 

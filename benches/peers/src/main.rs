@@ -9,7 +9,7 @@ use std::hint::black_box;
 use std::io::BufRead;
 use std::path::Path;
 
-use frames::{FRAMES, Frame, numbers};
+use frames::{Frame, numbers};
 use glam::{Vec2, Vec3};
 use nalgebra::Isometry3;
 use rustix::time::{ClockId, clock_gettime};
@@ -45,12 +45,15 @@ fn main() {
                 println!("{}", names.join(" "));
             }
             ["time", name, size] => {
-                let size = size.parse().expect("an index");
-                println!("{}", ns_per_solve(find(&mut methods, name), size));
+                let size: usize = size.parse().expect("an index");
+                println!(
+                    "{}",
+                    ns_per_solve(find(&mut methods, name), size, all[size].len())
+                );
             }
             ["poses", name, size] => {
-                let size = size.parse().expect("an index");
-                for index in 0..FRAMES {
+                let size: usize = size.parse().expect("an index");
+                for index in 0..all[size].len() {
                     let pose = find(&mut methods, name)(size, index);
                     println!("{}", pose.map_or("none".into(), |pose| row(&pose)));
                 }
@@ -69,9 +72,9 @@ fn row(pose: &Isometry3<f64>) -> String {
     numbers(pose).map(|x| format!("{x:e}")).join(" ")
 }
 
-fn ns_per_solve(solve: &mut Solve, size: usize) -> f64 {
+fn ns_per_solve(solve: &mut Solve, size: usize, frames: usize) -> f64 {
     let mut pass = || {
-        for index in 0..FRAMES {
+        for index in 0..frames {
             black_box(solve(black_box(size), black_box(index)));
         }
     };
@@ -81,7 +84,7 @@ fn ns_per_solve(solve: &mut Solve, size: usize) -> f64 {
         pass();
         passes += 1;
     }
-    (cpu_time_s() - begin_s) * 1e9 / f64::from(passes) / FRAMES as f64
+    (cpu_time_s() - begin_s) * 1e9 / f64::from(passes) / frames as f64
 }
 
 /// CPU time of this thread: what others do on the machine at the same time is not the method's.
