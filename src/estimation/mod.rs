@@ -13,7 +13,7 @@
 //! | `R, t` | `camera_from_tanker` | `Isometry3`, m          |
 //! | `Pᵢʷ`  | `marker_in_tanker`   | `Point3`, m             |
 //! | `Qᵢᶜ`  | `point_in_camera`    | `Vector3`, m            |
-//! | `vᵢ`   | `ray`                | [`Ray`](crate::camera::Ray), `z = 1` |
+//! | `vᵢ`   | `ray`                | [`Ray`], `z = 1` |
 //! | `K`    | [`Camera`]           | px                      |
 
 mod ambiguity;
