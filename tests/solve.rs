@@ -147,7 +147,7 @@ fn malformed_lines_are_answered_in_place_and_the_rest_is_solved() {
         (
             changed(&|v| v["points"][0]["x"] = json!(1e300)),
             "malformed",
-            "within 10000 m",
+            "within 1000 m",
         ),
         (
             changed(&|v| {

@@ -10,7 +10,19 @@ use tanker_pose::ros::node;
 /// Exit code for a command line that cannot be understood.
 const USAGE: u8 = 2;
 
+/// Exit code for a fault of this program or a library of it, as in sysexits.h.
+const INTERNAL_FAULT: i32 = 70;
+
 fn main() -> ExitCode {
+    // A middleware thread that ends would leave a node that neither hears nor speaks: end instead, so
+    // that whoever supervises the node sees it.
+    std::panic::set_hook(Box::new(|fault| {
+        let _ = writeln!(
+            std::io::stderr(),
+            "tanker_pose_node: internal fault, ending: {fault}"
+        );
+        std::process::exit(INTERNAL_FAULT);
+    }));
     let arguments: Result<Vec<String>, _> = std::env::args_os()
         .skip(1)
         .map(std::ffi::OsString::into_string)

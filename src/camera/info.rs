@@ -55,6 +55,8 @@ const MAX_COEFFICIENT: f64 = 1.0e9;
 const FIXED_ENTRY_TOLERANCE: f64 = 1.0e-9;
 
 /// The models that we have formulas for.
+/// Coefficients that an error keeps.
+const MAX_TOLD: usize = 16;
 const KNOWN_MODELS: &str = "plumb_bob, rational_polynomial, equidistant";
 
 /// Parts of the names that vendors give to fisheye models, which bend rays even when all coefficients
@@ -206,7 +208,7 @@ fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
             model: model.to_owned(),
             need,
             got: d.len(),
-            d: d.to_vec(),
+            d: d.iter().take(MAX_TOLD).copied().collect(),
         })
     };
     let all_zero = d.iter().all(|&value| value == 0.0);
@@ -233,7 +235,7 @@ fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
         _ if all_zero && !names_a_fisheye(model) => Ok(None),
         _ => Err(CameraError::UnknownDistortionModel {
             model: model.to_owned(),
-            d: d.to_vec(),
+            d: d.iter().take(MAX_TOLD).copied().collect(),
             known: KNOWN_MODELS,
         }),
     }

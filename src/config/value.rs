@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::text::clip;
+
 /// A value as it comes from a file, an argument or a service, before any check.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterValue {
@@ -34,7 +36,7 @@ impl fmt::Display for ParameterValue {
             Self::Bool(value) => write!(f, "{value}"),
             Self::Integer(value) => write!(f, "{value}"),
             Self::Double(value) => write!(f, "{value:?}"),
-            Self::String(value) => write!(f, "{value:?}"),
+            Self::String(value) => write!(f, "{:?}", clip(value)),
         }
     }
 }
@@ -44,7 +46,7 @@ impl fmt::Display for ParameterValue {
 #[non_exhaustive]
 pub enum ParameterError {
     /// No such parameter.
-    #[error("unknown parameter {name:?}{}", suggest(*suggestion))]
+    #[error("unknown parameter {:?}{}", clip(name), suggest(*suggestion))]
     Unknown {
         /// As it was written.
         name: String,
@@ -82,7 +84,7 @@ pub enum ParameterError {
         value: f64,
     },
     /// A word that is not among those allowed.
-    #[error("parameter {name:?} must be one of {}, got {value:?}", allowed.join(", "))]
+    #[error("parameter {name:?} must be one of {}, got {:?}", allowed.join(", "), clip(value))]
     NotAllowed {
         /// The parameter.
         name: &'static str,
@@ -92,7 +94,7 @@ pub enum ParameterError {
         allowed: &'static [&'static str],
     },
     /// Text that cannot be used.
-    #[error("parameter {name:?} must {requirement}, got {value:?}")]
+    #[error("parameter {name:?} must {requirement}, got {:?}", clip(value))]
     BadText {
         /// The parameter.
         name: &'static str,

@@ -15,6 +15,8 @@ use crate::geometry::PoseCovariance;
 /// rad; a subset that has turned farther from its prior has found a way to fit noise, not the tanker.
 const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
+/// Ratio of sigmas beyond which a point does not check the better ones.
+const WEAK_SIGMA_RATIO: f64 = 5.0;
 /// rad; spread of the attitude about its prior: refuelling keeps the relative angles within ±5°.
 const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
@@ -28,7 +30,7 @@ pub struct Estimator {
 /// A fit with what is known about its rivals.
 struct Candidate {
     fit: Fit,
-    rival_chi_squared: Option<f64>,
+    ambiguity: f64,
     iterations: u16,
     initialisation: Initialisation,
 }
@@ -104,6 +106,14 @@ impl Estimator {
                 need,
             });
         }
+        let precise = count_checking(observations);
+        if precise < self.settings.min_points {
+            return Err(EstimateError::TooFewPrecisePoints {
+                precise,
+                got: observations.len(),
+                need: self.settings.min_points,
+            });
+        }
         let problem = Problem::new(camera, self.settings.refinement, observations)?;
         let nominal = || {
             let seed = &self.settings.nominal_camera_from_tanker;
@@ -126,8 +136,7 @@ impl Estimator {
         }
     }
 
-    /// Returns what the prior holds against a hypothesis about wrong points: the squared turn from
-    /// the attitude it started from, in units of [`PRIOR_SIGMA`]; infinite beyond
+    /// Returns what the prior holds against a hypothesis about wrong points; infinite beyond
     /// [`MAX_TURN_FROM_PRIOR`], nothing for starts that have no prior.
     fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {
         let prior = match solution.initialisation {
@@ -135,15 +144,15 @@ impl Estimator {
             Initialisation::Previous => previous,
             Initialisation::Dlt | Initialisation::Global => None,
         };
-        let found = solution.camera_from_tanker.rotation.to_rotation_matrix();
-        prior.map_or(0.0, |prior| {
-            let turn = UnitQuaternion::from_rotation_matrix(&(found * prior.inverse())).angle();
-            if turn > MAX_TURN_FROM_PRIOR {
-                f64::INFINITY
-            } else {
-                (turn / PRIOR_SIGMA).powi(2)
-            }
-        })
+        let cost = squared_turn(
+            &solution.camera_from_tanker.rotation.to_rotation_matrix(),
+            prior,
+        );
+        if cost > (MAX_TURN_FROM_PRIOR / PRIOR_SIGMA).powi(2) {
+            f64::INFINITY
+        } else {
+            cost
+        }
     }
 
     fn solve_from(
@@ -154,9 +163,22 @@ impl Estimator {
     ) -> Result<Solution, EstimateError> {
         let minimum = problem.descend(seed)?;
         let fit = problem.fit(&minimum.rotation)?;
+        // The last attitude says nothing against a rival: it may have been the wrong one of the two.
+        let prior = (initialisation == Initialisation::Nominal).then_some(seed);
+        let cost = |fit: &Fit| fit.chi_squared + squared_turn(&fit.pose.rotation, prior);
+        let mut best = (fit, cost(&fit));
+        let mut rival = ambiguity::rival(problem, &fit).map(|rival| (rival, cost(&rival)));
+        if let Some(other) = &mut rival
+            && other.1 < best.1
+        {
+            std::mem::swap(other, &mut best);
+        }
         let candidate = Candidate {
-            fit,
-            rival_chi_squared: ambiguity::rival(problem, &fit).map(|rival| rival.chi_squared),
+            fit: best.0,
+            // The prior chooses, but does not make the choice look surer than the image does.
+            ambiguity: rival.map_or(0.0, |(rival, _)| {
+                likelihood_ratio(rival.chi_squared, best.0.chi_squared)
+            }),
             iterations: minimum.iterations.saturating_add(fit.iterations),
             initialisation,
         };
@@ -176,12 +198,35 @@ impl Estimator {
             chi_squared_limit: self.limits.limit(residuals - 6),
             iterations: candidate.iterations,
             initialisation: candidate.initialisation,
-            ambiguity: candidate
-                .rival_chi_squared
-                .map_or(0.0, |rival| likelihood_ratio(rival, fit.chi_squared)),
+            ambiguity: candidate.ambiguity,
             excluded: Excluded::default(),
         }
     }
+}
+
+/// Returns the squared turn from a prior attitude in units of [`PRIOR_SIGMA`]; 0 without a prior.
+fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
+    prior.map_or(0.0, |prior| {
+        let turn = UnitQuaternion::from_rotation_matrix(&(found * prior.inverse())).angle();
+        (turn / PRIOR_SIGMA).powi(2)
+    })
+}
+
+/// Returns how many points are precise enough to check others: those whose sigma is at most
+/// [`WEAK_SIGMA_RATIO`] times that of the third best. Any three fix a pose; what is much weaker than
+/// they are could not contradict them, so it gives no redundancy.
+fn count_checking(observations: &[Observation]) -> usize {
+    let mut best = [f64::INFINITY; 3];
+    for seen in observations {
+        if let Some(place) = best.iter().position(|sigma| seen.sigma_px < *sigma) {
+            best[place..].rotate_right(1);
+            best[place] = seen.sigma_px;
+        }
+    }
+    observations
+        .iter()
+        .filter(|seen| seen.sigma_px <= WEAK_SIGMA_RATIO * best[2])
+        .count()
 }
 
 /// Indices of the points that may be left out: all of a few, of many those that fit worst.
@@ -202,7 +247,7 @@ fn suspects(
         })
         .collect();
     suspects.sort_by(|a, b| b.0.total_cmp(&a.0));
-    suspects.truncate(exclude::MAX_SUSPECTS);
+    suspects.truncate(exclude::max_suspects(observations.len()));
     let mut suspects: Vec<usize> = suspects.into_iter().map(|(_, index)| index).collect();
     suspects.sort_unstable();
     suspects
@@ -255,7 +300,9 @@ fn globally(problem: &Problem) -> Result<Candidate, EstimateError> {
     let (fit, _) = ranking.best.unwrap_or((fit, 0.0));
     Ok(Candidate {
         fit,
-        rival_chi_squared: ranking.rival.map(|(rival, _)| rival.chi_squared),
+        ambiguity: ranking.rival.map_or(0.0, |(rival, _)| {
+            likelihood_ratio(rival.chi_squared, fit.chi_squared)
+        }),
         iterations,
         initialisation: Initialisation::Global,
     })

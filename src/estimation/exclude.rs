@@ -11,9 +11,11 @@ use super::ambiguity::likelihood_ratio;
 use super::{EstimateError, Excluded, Observation, Solution};
 use crate::geometry::pose_error;
 
-/// Among more points than this only the ones with the largest residuals are suspected, so that the
-/// cost stays bounded: one gross error among many hardly moves the fit of all of them.
-pub(crate) const MAX_SUSPECTS: usize = 12;
+/// Returns how many points are suspected at most: those with the largest residuals, so that the cost
+/// stays bounded. Among many points a gross error hardly moves the fit of all, and stands out.
+pub(crate) const fn max_suspects(points: usize) -> usize {
+    if points <= 64 { 12 } else { 4 }
+}
 /// Points that must remain where a prior says what is plausible: fewer leave nothing to judge by.
 pub(crate) const MIN_REMAINING_WITH_PRIOR: usize = 4;
 /// Points that must remain where nothing does: any four fit some attitude too often. Left and right

@@ -84,7 +84,8 @@ pub struct EstimatorSettings {
     pub refinement: Refinement,
     /// Rotation part of the expected `camera_from_tanker`.
     pub nominal_camera_from_tanker: Rotation3<f64>,
-    /// Fewer points give no pose; the initialisation may need more.
+    /// Fewer points give no pose, nor do fewer whose sigma is at most five times that of the third
+    /// best; the initialisation may need more.
     pub min_points: usize,
     /// At most this many points may be excluded as wrong, 0 to 2.
     pub max_outliers: usize,
@@ -141,7 +142,8 @@ pub struct Solution {
     pub iterations: u16,
     /// Where the iteration really started.
     pub initialisation: Initialisation,
-    /// Likelihood of the best rival pose in front of the camera over that of this one, at most 1; 0: no rival.
+    /// Likelihood of the best rival pose in front of the camera over that of this one, at most 1; 0: no
+    /// rival. From the image alone, whatever the prior says.
     pub ambiguity: f64,
     /// Points left out as wrong.
     pub excluded: Excluded,
@@ -193,6 +195,18 @@ pub enum EstimateError {
     /// Fewer points than the solver needs.
     #[error("expected at least {need} points, got {got}")]
     TooFewPoints {
+        /// Points at hand.
+        got: usize,
+        /// Points needed.
+        need: usize,
+    },
+    /// Enough points, but too few that are precise enough to check each other.
+    #[error(
+        "expected at least {need} points of similar sigma, got {precise} of {got}: sigmas above five times the third best check nothing"
+    )]
+    TooFewPrecisePoints {
+        /// Points whose sigma is near that of the best.
+        precise: usize,
         /// Points at hand.
         got: usize,
         /// Points needed.

@@ -39,6 +39,13 @@ impl PoseCovariance {
             .map(|factor| error.dot(&factor.solve(error)))
     }
 
+    /// Returns the largest standard deviation of the attitude in any direction, rad.
+    #[must_use]
+    pub fn largest_attitude_sigma(&self) -> f64 {
+        let attitude = self.0.fixed_view::<3, 3>(3, 3).into_owned();
+        attitude.symmetric_eigenvalues().max().max(0.0).sqrt()
+    }
+
     /// Returns whether the matrix is finite, symmetric and positive definite.
     #[must_use]
     pub fn is_valid(&self) -> bool {

@@ -90,8 +90,12 @@ impl Refusal {
             Self::NotFinite { .. } => OutcomeCode::NotFinite,
             Self::InvalidSigma { .. } => OutcomeCode::InvalidSigma,
             Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
-            Self::TooFewPoints { .. } => OutcomeCode::TooFewPoints,
-            Self::DegenerateGeometry { .. } => OutcomeCode::DegenerateGeometry,
+            Self::TooFewPoints { .. } | Self::TooFewPrecisePoints { .. } => {
+                OutcomeCode::TooFewPoints
+            }
+            Self::DegenerateGeometry { .. } | Self::TooUncertain { .. } => {
+                OutcomeCode::DegenerateGeometry
+            }
             Self::NoConvergence { .. } => OutcomeCode::NoConvergence,
             Self::BehindCamera { .. } => OutcomeCode::BehindCamera,
             Self::NotTrusted { .. } => OutcomeCode::NotTrusted,

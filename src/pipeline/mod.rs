@@ -34,6 +34,18 @@ pub struct Stamp {
     pub nanosec: u32,
 }
 
+/// s; a pose older than this says little about the next one.
+const MAX_PREVIOUS_AGE_S: f64 = 2.0;
+
+impl Stamp {
+    /// Returns whether this is at or after `earlier`, by [`MAX_PREVIOUS_AGE_S`] at the most.
+    fn follows_closely(self, earlier: Self) -> bool {
+        let seconds = f64::from(self.sec) - f64::from(earlier.sec);
+        let nanoseconds = f64::from(self.nanosec) - f64::from(earlier.nanosec);
+        (0.0..=MAX_PREVIOUS_AGE_S).contains(&(seconds + nanoseconds * 1e-9))
+    }
+}
+
 /// One beacon found in an image, before any check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
@@ -73,7 +85,8 @@ pub struct Pipeline {
     estimator: Estimator,
     map: Arc<MarkerMap>,
     camera: Option<LatchedCamera>,
-    previous_rotation: Option<Rotation3<f64>>,
+    /// Rotation of the last trusted pose, with its time.
+    previous: Option<(Rotation3<f64>, Stamp)>,
 }
 
 impl Pipeline {
@@ -85,7 +98,7 @@ impl Pipeline {
             settings,
             map,
             camera: None,
-            previous_rotation: None,
+            previous: None,
         }
     }
 
@@ -133,18 +146,19 @@ impl Pipeline {
 
     /// Returns the outcome of one frame.
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
+        let previous = self
+            .previous
+            .filter(|(_, stamp)| frame.stamp.follows_closely(*stamp));
         let outcome = match self.observations(frame) {
-            Ok((camera, observations)) => solve(
-                &self.estimator,
-                camera,
-                &observations,
-                self.previous_rotation.as_ref(),
-            ),
+            Ok((camera, observations)) => {
+                let rotation = previous.as_ref().map(|(rotation, _)| rotation);
+                solve(&self.estimator, camera, &observations, rotation)
+            }
             Err(refusal) => FrameOutcome::refused(refusal),
         };
         if let Ok(solution) = &outcome.result {
-            self.previous_rotation =
-                Some(solution.camera_from_tanker.rotation.to_rotation_matrix());
+            let rotation = solution.camera_from_tanker.rotation.to_rotation_matrix();
+            self.previous = Some((rotation, frame.stamp));
         }
         outcome
     }
@@ -181,7 +195,9 @@ pub fn solve(
         Err(error) => {
             let attempted = !matches!(
                 error,
-                EstimateError::TooFewPoints { .. } | EstimateError::NoRay { .. }
+                EstimateError::TooFewPoints { .. }
+                    | EstimateError::TooFewPrecisePoints { .. }
+                    | EstimateError::NoRay { .. }
             );
             let mut outcome = FrameOutcome::refused(Refusal::from(error));
             outcome.initialisation = attempted.then_some(asked);

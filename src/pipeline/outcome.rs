@@ -75,6 +75,28 @@ pub enum Refusal {
         /// Points needed.
         need: usize,
     },
+    /// Enough points, but too few that are precise enough to check each other.
+    #[error(
+        "expected at least {need} points of similar sigma, got {precise} of {got}: sigmas above five times the third best check nothing"
+    )]
+    TooFewPrecisePoints {
+        /// Points whose sigma is near that of the best.
+        precise: usize,
+        /// Points at hand.
+        got: usize,
+        /// Points needed.
+        need: usize,
+    },
+    /// The attitude is so uncertain that no covariance describes it.
+    #[error(
+        "expected an attitude known to {limit_deg}° or better (1 sigma), got {sigma_deg:.1}°: beyond that a covariance is not honest"
+    )]
+    TooUncertain {
+        /// Largest standard deviation of the attitude, degrees.
+        sigma_deg: f64,
+        /// The largest to publish, degrees.
+        limit_deg: f64,
+    },
     /// The points cannot fix a pose.
     #[error("expected points that fix a pose, but {reason}")]
     DegenerateGeometry {
@@ -127,6 +149,9 @@ impl From<EstimateError> for Refusal {
     fn from(error: EstimateError) -> Self {
         match error {
             EstimateError::TooFewPoints { got, need } => Self::TooFewPoints { got, need },
+            EstimateError::TooFewPrecisePoints { precise, got, need } => {
+                Self::TooFewPrecisePoints { precise, got, need }
+            }
             EstimateError::NoRay { id, cause } => Self::OutsideImage {
                 id,
                 reason: cause.to_string(),
@@ -196,6 +221,9 @@ impl FrameOutcome {
     }
 }
 
+/// degrees; within it the true error follows the covariance, beyond it the projection bends too much.
+const MAX_ATTITUDE_SIGMA_DEG: f64 = 10.0;
+
 fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
     if !solution.is_trusted() {
         return Some(Refusal::NotTrusted {
@@ -210,10 +238,17 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
             reason: "from this view they leave a direction of the pose free",
         });
     }
-    (solution.ambiguity >= settings.max_ambiguity && settings.max_ambiguity < 1.0).then_some(
-        Refusal::Ambiguous {
-            ambiguity: solution.ambiguity,
-            limit: settings.max_ambiguity,
-        },
-    )
+    let sigma_deg = solution.covariance.largest_attitude_sigma().to_degrees();
+    if sigma_deg > MAX_ATTITUDE_SIGMA_DEG {
+        return Some(Refusal::TooUncertain {
+            sigma_deg,
+            limit_deg: MAX_ATTITUDE_SIGMA_DEG,
+        });
+    }
+    let limit = settings.max_ambiguity;
+    let has_rival = solution.ambiguity > 0.0 && solution.ambiguity >= limit;
+    (has_rival && limit < 1.0).then_some(Refusal::Ambiguous {
+        ambiguity: solution.ambiguity,
+        limit: settings.max_ambiguity,
+    })
 }

@@ -121,9 +121,12 @@ impl Estimator {
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
         let info = convert::camera_info(message);
-        // What came of it is asked for below: good and bad ones are told in one place.
-        let _ = self.pipeline.set_camera(&info, &message.header.frame_id);
+        let result = self.pipeline.set_camera(&info, &message.header.frame_id);
+        let was_valid = matches!(self.camera, CameraState::Valid { .. });
         self.note_camera();
+        if was_valid && result == Ok(true) {
+            log::info!("camera info has changed: {}", self.camera);
+        }
     }
 
     /// Takes the detections of an image; publishes what becomes of them.

@@ -114,6 +114,7 @@ pub fn run_until(
     }
     let served = Service::open(&mut ros, &configuration, &map).map(|mut service| {
         introduce(&ros, environment, &map, configuration.publish_tf);
+        warn_of_too_small_map(&configuration, &map);
         let update = || Configuration::from(&parameters.snapshot()).settings;
         smol::block_on(service.serve(&ros, stop, changes, update));
     });
@@ -134,6 +135,20 @@ fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     let text = std::fs::read_to_string(&path)
         .map_err(|source| NodeError::MapUnreadable { path, source })?;
     Ok(MarkerMap::from_yaml(&text, name)?)
+}
+
+/// Says at the start what would refuse every frame.
+fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
+    let estimator = &configuration.settings.estimator;
+    let need = estimator
+        .min_points
+        .max(estimator.initialisation.min_points());
+    let markers = map.markers().len();
+    if markers < need {
+        log::warn!(
+            "every frame will be refused: the marker map has {markers} markers, min_points and initialisation need {need}"
+        );
+    }
 }
 
 fn introduce(ros: &RosNode, environment: &Environment, map: &MarkerMap, publish_tf: bool) {

@@ -184,7 +184,7 @@ mod tests {
             found.get("pixel_sigma_px"),
             Some(&ParameterValue::Double(1.0))
         );
-        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(4)));
+        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(5)));
     }
 
     #[test]

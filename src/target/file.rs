@@ -126,10 +126,10 @@ markers:
     fn coordinates_no_aircraft_reaches_are_refused_at_their_line() {
         assert_eq!(
             refusal_of_sixth_line("  - {id: 4, x: 10000.5, y: 1, z: 1}"),
-            "m.yaml:6:16: x of marker 4 must be within 10000 m of the origin, got 10000.5 m"
+            "m.yaml:6:16: x of marker 4 must be within 1000 m of the origin, got 10000.5 m"
         );
         let at_the_limit = format!(
-            "{GOOD}  - {{id: 4, x: -1.0e4, y: 1, z: 1}}\n  - {{id: 5, x: 1, y: 1.0e4, z: 1}}\n"
+            "{GOOD}  - {{id: 4, x: -1.0e3, y: 1, z: 1}}\n  - {{id: 5, x: 1, y: 1.0e3, z: 1}}\n"
         );
         assert!(read(&at_the_limit, "m.yaml").is_ok());
     }

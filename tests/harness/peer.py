@@ -81,6 +81,13 @@ class Peer:
         self.node.destroy_client(client)
         return future.result()
 
+    def send(self, service_type: type, name: str, request: Any) -> None:
+        """Asks a service whose response may never come."""
+        client = self.node.create_client(service_type, name)
+        self.spin_until(client.service_is_ready, f"service {name}")
+        client.call_async(request)
+        self.spin_for(0.5)
+
     def sees_node(self, full_name: str) -> bool:
         """Whether the graph holds a node of this name."""
         namespace, _, name = full_name.rpartition("/")

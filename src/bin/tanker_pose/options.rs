@@ -27,7 +27,7 @@ pub struct EstimatorOptions {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
     max_outliers: u8,
     /// Probability with which a correct frame passes the chi-squared test
-    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = between(0.5, 0.999_999))]
     trust_probability: f64,
     /// Refuse a frame when a second pose is at least this likely; 1: never
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = between(0.0, 1.0))]
@@ -37,7 +37,8 @@ pub struct EstimatorOptions {
         long,
         value_name = "DEG",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = between(-180.0, 180.0)
     )]
     nominal_roll_deg: f64,
     /// Pitch, degrees
@@ -45,7 +46,8 @@ pub struct EstimatorOptions {
         long,
         value_name = "DEG",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = between(-180.0, 180.0)
     )]
     nominal_pitch_deg: f64,
     /// Yaw, degrees
@@ -53,7 +55,8 @@ pub struct EstimatorOptions {
         long,
         value_name = "DEG",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = between(-180.0, 180.0)
     )]
     nominal_yaw_deg: f64,
 }

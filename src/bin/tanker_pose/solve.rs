@@ -21,7 +21,7 @@ use crate::options::{self, EstimatorOptions};
 /// Outcome of a line that is not a frame.
 const MALFORMED: &str = "malformed";
 /// m; a marker farther from the tanker's origin is a mistake in units.
-const MAX_COORDINATE_M: f64 = 1e4;
+const MAX_COORDINATE_M: f64 = 1e3;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
