@@ -3,6 +3,8 @@
 //! One JSON object a line in, one a line out, in order. A line that cannot be read or solved gives an
 //! output line with its outcome and message, and the next goes on.
 
+mod lines;
+
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
 use std::path::PathBuf;
@@ -10,16 +12,14 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 use nalgebra::{Point3, Rotation3};
-use serde::{Deserialize, Serialize};
-use tanker_pose::camera::{Camera, CameraError, CameraInfo, RegionOfInterest};
-use tanker_pose::estimation::{Estimator, Solution};
+use tanker_pose::camera::{Camera, CameraError, CameraInfo};
+use tanker_pose::estimation::Estimator;
 use tanker_pose::pipeline::{self, Detection, FrameOutcome, Refusal, observe};
 use tanker_pose::target::MarkerMap;
 
+use self::lines::{InputFrame, InputPoint, OutputFrame, reason};
 use crate::options::{self, EstimatorOptions};
 
-/// Outcome of a line that is not a frame.
-const MALFORMED: &str = "malformed";
 /// m; a marker farther from the tanker's origin is a mistake in units.
 const MAX_COORDINATE_M: f64 = 1e3;
 
@@ -51,91 +51,6 @@ pub enum SolveError {
     Read(std::io::Error),
     #[error("cannot write the output: {0}")]
     Write(std::io::Error),
-}
-
-#[derive(Debug, Deserialize)]
-struct InputFrame {
-    #[serde(default)]
-    id: serde_json::Value,
-    camera: InputCamera,
-    points: Vec<InputPoint>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InputCamera {
-    #[serde(default)]
-    width: u32,
-    #[serde(default)]
-    height: u32,
-    #[serde(default)]
-    distortion_model: String,
-    #[serde(default)]
-    d: Vec<f64>,
-    k: [f64; 9],
-    #[serde(default)]
-    r: [f64; 9],
-    #[serde(default)]
-    p: Vec<f64>,
-    #[serde(default)]
-    binning_x: u32,
-    #[serde(default)]
-    binning_y: u32,
-    #[serde(default)]
-    roi: InputRoi,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct InputRoi {
-    x_offset: u32,
-    y_offset: u32,
-    height: u32,
-    width: u32,
-    do_rectify: bool,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InputPoint {
-    id: u32,
-    x: Option<f64>,
-    y: Option<f64>,
-    z: Option<f64>,
-    u: f64,
-    v: f64,
-    #[serde(default)]
-    sigma: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct OutputFrame {
-    id: serde_json::Value,
-    outcome: String,
-    message: String,
-    #[serde(flatten)]
-    pose: Option<OutputPose>,
-    used_ids: Vec<u32>,
-    rejected_ids: Vec<u32>,
-    #[serde(flatten)]
-    numbers: Option<OutputNumbers>,
-}
-
-/// Only for trusted frames: a doubtful pose is not printed.
-#[derive(Debug, Serialize)]
-struct OutputPose {
-    rotation: Vec<f64>,
-    translation: Vec<f64>,
-    covariance: Vec<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct OutputNumbers {
-    rms_px: f64,
-    chi_squared: f64,
-    degrees_of_freedom: u16,
-    ambiguity: f64,
-    iterations: u16,
 }
 
 /// Reads frames, writes outcomes, until the input ends.
@@ -327,109 +242,6 @@ impl Solver {
                 "point {}: expected all of x, y, z or none of them",
                 point.id
             )),
-        }
-    }
-}
-
-/// The parser's reason without its own position: each line is a document of its own to it.
-fn reason(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    text.rsplit_once(" at line ")
-        .map_or(text.as_str(), |(reason, _)| reason)
-        .to_owned()
-}
-
-impl InputPoint {
-    fn detection(&self) -> Detection {
-        Detection {
-            id: self.id,
-            u_px: self.u,
-            v_px: self.v,
-            sigma_px: self.sigma,
-        }
-    }
-}
-
-impl InputCamera {
-    fn info(&self) -> Result<CameraInfo, String> {
-        let p = match self.p.len() {
-            0 => [0.0; 12],
-            _ => <[f64; 12]>::try_from(self.p.as_slice())
-                .map_err(|_| format!("camera: expected 12 numbers in p, got {}", self.p.len()))?,
-        };
-        Ok(CameraInfo {
-            height: self.height,
-            width: self.width,
-            distortion_model: self.distortion_model.clone(),
-            d: self.d.clone(),
-            k: self.k,
-            r: self.r,
-            p,
-            binning_x: self.binning_x,
-            binning_y: self.binning_y,
-            roi: RegionOfInterest {
-                x_offset: self.roi.x_offset,
-                y_offset: self.roi.y_offset,
-                height: self.roi.height,
-                width: self.roi.width,
-                do_rectify: self.roi.do_rectify,
-            },
-        })
-    }
-}
-
-impl OutputFrame {
-    fn malformed(id: serde_json::Value, message: String) -> Self {
-        Self {
-            id,
-            outcome: MALFORMED.to_owned(),
-            message,
-            pose: None,
-            used_ids: Vec::new(),
-            rejected_ids: Vec::new(),
-            numbers: None,
-        }
-    }
-
-    fn new(id: serde_json::Value, outcome: FrameOutcome) -> Self {
-        Self {
-            id,
-            outcome: outcome.code().name().to_ascii_lowercase(),
-            message: outcome
-                .result
-                .as_ref()
-                .err()
-                .map(ToString::to_string)
-                .unwrap_or_default(),
-            pose: outcome.result.as_ref().ok().map(OutputPose::new),
-            numbers: outcome.solution().map(OutputNumbers::new),
-            used_ids: outcome.used_ids,
-            rejected_ids: outcome.rejected_ids,
-        }
-    }
-}
-
-impl OutputPose {
-    fn new(solution: &Solution) -> Self {
-        let pose = &solution.camera_from_tanker;
-        let rotation = pose.rotation.to_rotation_matrix();
-        Self {
-            // nalgebra stores columns; the transpose's columns are the rows.
-            rotation: rotation.matrix().transpose().as_slice().to_vec(),
-            translation: pose.translation.vector.as_slice().to_vec(),
-            covariance: solution.covariance.row_major().to_vec(),
-        }
-    }
-}
-
-impl OutputNumbers {
-    fn new(solution: &Solution) -> Self {
-        Self {
-            rms_px: solution.rms_px,
-            chi_squared: solution.chi_squared,
-            degrees_of_freedom: solution.degrees_of_freedom,
-            ambiguity: solution.ambiguity,
-            iterations: solution.iterations,
         }
     }
 }

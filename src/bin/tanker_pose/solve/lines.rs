@@ -1,0 +1,197 @@
+//! The lines that `solve` reads and writes.
+
+use serde::{Deserialize, Serialize};
+use tanker_pose::camera::{CameraInfo, RegionOfInterest};
+use tanker_pose::estimation::Solution;
+use tanker_pose::pipeline::{Detection, FrameOutcome};
+
+/// Outcome of a line that is not a frame.
+const MALFORMED: &str = "malformed";
+
+#[derive(Debug, Deserialize)]
+pub struct InputFrame {
+    #[serde(default)]
+    pub id: serde_json::Value,
+    pub camera: InputCamera,
+    pub points: Vec<InputPoint>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputCamera {
+    #[serde(default)]
+    width: u32,
+    #[serde(default)]
+    height: u32,
+    #[serde(default)]
+    distortion_model: String,
+    #[serde(default)]
+    d: Vec<f64>,
+    k: [f64; 9],
+    #[serde(default)]
+    r: [f64; 9],
+    #[serde(default)]
+    p: Vec<f64>,
+    #[serde(default)]
+    binning_x: u32,
+    #[serde(default)]
+    binning_y: u32,
+    #[serde(default)]
+    roi: InputRoi,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InputRoi {
+    x_offset: u32,
+    y_offset: u32,
+    height: u32,
+    width: u32,
+    do_rectify: bool,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputPoint {
+    pub id: u32,
+    pub x: Option<f64>,
+    pub y: Option<f64>,
+    pub z: Option<f64>,
+    pub u: f64,
+    pub v: f64,
+    #[serde(default)]
+    pub sigma: f64,
+}
+
+#[derive(Debug, Serialize)]
+pub struct OutputFrame {
+    id: serde_json::Value,
+    outcome: String,
+    message: String,
+    #[serde(flatten)]
+    pose: Option<OutputPose>,
+    used_ids: Vec<u32>,
+    rejected_ids: Vec<u32>,
+    #[serde(flatten)]
+    numbers: Option<OutputNumbers>,
+}
+
+/// Only for trusted frames: a doubtful pose is not printed.
+#[derive(Debug, Serialize)]
+pub struct OutputPose {
+    rotation: Vec<f64>,
+    translation: Vec<f64>,
+    covariance: Vec<f64>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct OutputNumbers {
+    rms_px: f64,
+    chi_squared: f64,
+    degrees_of_freedom: u16,
+    ambiguity: f64,
+    iterations: u16,
+}
+
+/// The parser's reason without its own position: each line is a document of its own to it.
+pub fn reason(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    text.rsplit_once(" at line ")
+        .map_or(text.as_str(), |(reason, _)| reason)
+        .to_owned()
+}
+
+impl InputPoint {
+    pub fn detection(&self) -> Detection {
+        Detection {
+            id: self.id,
+            u_px: self.u,
+            v_px: self.v,
+            sigma_px: self.sigma,
+        }
+    }
+}
+
+impl InputCamera {
+    pub fn info(&self) -> Result<CameraInfo, String> {
+        let p = match self.p.len() {
+            0 => [0.0; 12],
+            _ => <[f64; 12]>::try_from(self.p.as_slice())
+                .map_err(|_| format!("camera: expected 12 numbers in p, got {}", self.p.len()))?,
+        };
+        Ok(CameraInfo {
+            height: self.height,
+            width: self.width,
+            distortion_model: self.distortion_model.clone(),
+            d: self.d.clone(),
+            k: self.k,
+            r: self.r,
+            p,
+            binning_x: self.binning_x,
+            binning_y: self.binning_y,
+            roi: RegionOfInterest {
+                x_offset: self.roi.x_offset,
+                y_offset: self.roi.y_offset,
+                height: self.roi.height,
+                width: self.roi.width,
+                do_rectify: self.roi.do_rectify,
+            },
+        })
+    }
+}
+
+impl OutputFrame {
+    pub fn malformed(id: serde_json::Value, message: String) -> Self {
+        Self {
+            id,
+            outcome: MALFORMED.to_owned(),
+            message,
+            pose: None,
+            used_ids: Vec::new(),
+            rejected_ids: Vec::new(),
+            numbers: None,
+        }
+    }
+
+    pub fn new(id: serde_json::Value, outcome: FrameOutcome) -> Self {
+        Self {
+            id,
+            outcome: outcome.code().name().to_ascii_lowercase(),
+            message: outcome
+                .result
+                .as_ref()
+                .err()
+                .map(ToString::to_string)
+                .unwrap_or_default(),
+            pose: outcome.result.as_ref().ok().map(OutputPose::new),
+            numbers: outcome.solution().map(OutputNumbers::new),
+            used_ids: outcome.used_ids,
+            rejected_ids: outcome.rejected_ids,
+        }
+    }
+}
+
+impl OutputPose {
+    pub fn new(solution: &Solution) -> Self {
+        let pose = &solution.camera_from_tanker;
+        let rotation = pose.rotation.to_rotation_matrix();
+        Self {
+            // nalgebra stores columns; the transpose's columns are the rows.
+            rotation: rotation.matrix().transpose().as_slice().to_vec(),
+            translation: pose.translation.vector.as_slice().to_vec(),
+            covariance: solution.covariance.row_major().to_vec(),
+        }
+    }
+}
+
+impl OutputNumbers {
+    pub fn new(solution: &Solution) -> Self {
+        Self {
+            rms_px: solution.rms_px,
+            chi_squared: solution.chi_squared,
+            degrees_of_freedom: solution.degrees_of_freedom,
+            ambiguity: solution.ambiguity,
+            iterations: solution.iterations,
+        }
+    }
+}
