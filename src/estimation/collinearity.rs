@@ -13,21 +13,21 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::lane::{accumulate, add, mul, splat, sub, total};
-use super::points::{Block, LANES, Lane, Points};
+use super::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory, totals};
+use super::points::{Block, Points};
 use crate::camera::Ray;
 
 /// A symmetric 3×3 matrix by its upper triangle: 11, 12, 13, 22, 23, 33.
 pub(crate) type Symmetric3<T = f64> = [T; 6];
 
-/// Where block `(a, b)` stands in [`CollinearityMoments::ppw`].
-const BLOCK: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+/// Where entry `(a, b)` of a symmetric matrix stands in [`Symmetric3`].
+const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// Returns `I − v vᵀ / (vᵀ v)`, the weight of the paper's object-space error.
 ///
 /// # Source
 /// Ding, Wei, Wang 2011, Eqs. (11)–(12).
-#[inline]
+#[inline(always)]
 #[must_use]
 pub(crate) fn object_space_weight(ray: Ray) -> Symmetric3 {
     let Ray { x, y } = ray;
@@ -55,195 +55,368 @@ pub(crate) enum Weighting {
 impl Weighting {
     /// Returns the weights of a block's points; nothing where there is no point.
     #[inline(always)]
-    fn of(self, block: &Block) -> Symmetric3<Lane> {
+    fn of<A: Arithmetic>(self, arithmetic: A, block: &Block) -> Symmetric3<Four<A>> {
+        let load = |lane| Four::new(arithmetic, lane);
         match self {
             Self::ObjectSpace => {
-                let mut weights = [[0.0; LANES]; 6];
-                for lane in 0..LANES {
-                    if block.variance[lane] > 0.0 {
-                        let ray = Ray {
-                            x: block.ray[0][lane],
-                            y: block.ray[1][lane],
-                        };
-                        for (lanes, value) in weights.iter_mut().zip(object_space_weight(ray)) {
-                            lanes[lane] = value;
-                        }
-                    }
-                }
-                weights
+                let (x, y) = (load(block.ray[0]), load(block.ray[1]));
+                let (one, zero) = (Four::splat(arithmetic, 1.0), Four::splat(arithmetic, 0.0));
+                let there = load(block.variance.map(|px2| if px2 > 0.0 { 1.0 } else { 0.0 }));
+                let share = one / one.plus(x, x).plus(y, y);
+                let (xs, ys) = (x * share, y * share);
+                [
+                    one.minus(x, xs),
+                    zero.minus(x, ys),
+                    zero - xs,
+                    one.minus(y, ys),
+                    zero - ys,
+                    one - share,
+                ]
+                .map(|weight| weight * there)
             }
             Self::Image => {
-                let ([x, y], [b11, b12, b22]) = (block.ray, block.information);
-                let h1 = add(mul(b11, x), mul(b12, y));
-                let h2 = add(mul(b12, x), mul(b22, y));
-                let zero = splat(0.0);
-                let h3 = add(mul(h1, x), mul(h2, y));
-                [b11, b12, sub(zero, h1), b22, sub(zero, h2), h3]
+                let (x, y) = (load(block.ray[0]), load(block.ray[1]));
+                let [b11, b12, b22] = block.information;
+                let (b11, b12, b22) = (load(b11), load(b12), load(b22));
+                let zero = Four::splat(arithmetic, 0.0);
+                let h1 = zero.minus(b11, x).minus(b12, y);
+                let h2 = zero.minus(b12, x).minus(b22, y);
+                let h3 = zero.minus(h1, x).minus(h2, y);
+                [b11, b12, h1, b22, h2, h3]
             }
         }
+    }
+}
+
+/// Three registers; nine or ten numbers count, the rest is padding.
+const PADDED: usize = 3 * LANES;
+/// 1, x, y, z, xx, xy, xz, yy, yz, zz of a marker.
+const MONOMIALS: usize = 10;
+type Monomials = [f64; MONOMIALS];
+
+/// Twelve numbers in registers.
+#[derive(Clone, Copy)]
+struct Twelve<A: Arithmetic>([Four<A>; 3]);
+
+impl<A: Arithmetic> Twelve<A> {
+    #[inline(always)]
+    fn zero(arithmetic: A) -> Self {
+        Self([Four::splat(arithmetic, 0.0); 3])
+    }
+
+    #[inline(always)]
+    fn new(arithmetic: A, v: &[f64; PADDED]) -> Self {
+        Self([
+            Four::new(arithmetic, [v[0], v[1], v[2], v[3]]),
+            Four::new(arithmetic, [v[4], v[5], v[6], v[7]]),
+            Four::new(arithmetic, [v[8], v[9], v[10], v[11]]),
+        ])
+    }
+
+    /// Returns `self + factor * v`.
+    #[inline(always)]
+    fn plus(self, v: Self, factor: Four<A>) -> Self {
+        Self([
+            self.0[0].plus(v.0[0], factor),
+            self.0[1].plus(v.0[1], factor),
+            self.0[2].plus(v.0[2], factor),
+        ])
+    }
+
+    /// Returns `self - factor * v`.
+    #[inline(always)]
+    fn minus(self, v: Self, factor: Four<A>) -> Self {
+        Self([
+            self.0[0].minus(v.0[0], factor),
+            self.0[1].minus(v.0[1], factor),
+            self.0[2].minus(v.0[2], factor),
+        ])
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f64; PADDED] {
+        let [a, b, c] = [self.0[0].lane(), self.0[1].lane(), self.0[2].lane()];
+        [
+            a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3], c[0], c[1], c[2], c[3],
+        ]
     }
 }
 
 /// The sums over points that the cost is made of.
 #[derive(Debug, Clone)]
-pub(crate) struct CollinearityMoments<T = f64> {
-    /// `Σ W`.
-    w: Symmetric3<T>,
-    /// `Σ p_a W`.
-    pw: [Symmetric3<T>; 3],
-    /// `Σ p_a p_b W` for ab = 11, 12, 13, 22, 23, 33.
-    ppw: [Symmetric3<T>; 6],
+pub(crate) struct CollinearityMoments {
+    /// `Σ w (1, p, p pᵀ)` for each entry `w` of `W`.
+    sums: Symmetric3<Monomials>,
 }
 
 impl CollinearityMoments {
     /// Returns the sums over all points.
-    pub(crate) fn new(points: &Points, weighting: Weighting) -> Self {
-        let mut sums = CollinearityMoments::<Lane>::ZERO;
-        for block in &points.blocks {
-            sums.add(block, &weighting.of(block));
-        }
-        Self {
-            w: sums.w.map(total),
-            pw: sums.pw.map(|weights| weights.map(total)),
-            ppw: sums.ppw.map(|weights| weights.map(total)),
-        }
-    }
-}
-
-impl CollinearityMoments<Lane> {
-    const ZERO: Self = Self {
-        w: [[0.0; LANES]; 6],
-        pw: [[[0.0; LANES]; 6]; 3],
-        ppw: [[[0.0; LANES]; 6]; 6],
-    };
-
     #[inline(always)]
-    fn add(&mut self, block: &Block, weights: &Symmetric3<Lane>) {
-        let [x, y, z] = block.marker;
-        for k in 0..6 {
-            let w = weights[k];
-            let (xw, yw, zw) = (mul(x, w), mul(y, w), mul(z, w));
-            self.w[k] = add(self.w[k], w);
-            self.pw[0][k] = add(self.pw[0][k], xw);
-            self.pw[1][k] = add(self.pw[1][k], yw);
-            self.pw[2][k] = add(self.pw[2][k], zw);
-            accumulate(&mut self.ppw[0][k], x, xw);
-            accumulate(&mut self.ppw[1][k], x, yw);
-            accumulate(&mut self.ppw[2][k], x, zw);
-            accumulate(&mut self.ppw[3][k], y, yw);
-            accumulate(&mut self.ppw[4][k], y, zw);
-            accumulate(&mut self.ppw[5][k], z, zw);
+    pub(crate) fn new<A: Arithmetic>(arithmetic: A, points: &Points, weighting: Weighting) -> Self {
+        // Without distortion, columns and rows do not mix and differ by a factor only.
+        match (weighting, points.row_by_column_information) {
+            (Weighting::Image, Some(ratio)) => {
+                let [w11, w13, w23, w33] = sums(arithmetic, points, |block| {
+                    let [w11, _, w13, _, w23, w33] = weighting.of(arithmetic, block);
+                    [w11, w13, w23, w33]
+                });
+                let zero = [0.0; MONOMIALS];
+                let w22 = w11.map(|sum| sum * ratio);
+                Self {
+                    sums: [w11, zero, w13, w22, w23, w33],
+                }
+            }
+            _ => Self {
+                sums: sums(arithmetic, points, |block| weighting.of(arithmetic, block)),
+            },
         }
+    }
+
+    /// Returns a row of the matrix that monomial `index` of all entries makes.
+    #[inline(always)]
+    fn row(&self, index: usize, row: usize) -> [f64; 3] {
+        let [a, b, c] = ENTRY[row];
+        [
+            self.sums[a][index],
+            self.sums[b][index],
+            self.sums[c][index],
+        ]
+    }
+
+    /// Returns the first four of the three matrices' rows, side by side.
+    #[inline(always)]
+    fn rows(&self, indices: [usize; 3], row: usize) -> [f64; PADDED] {
+        let [a, b, c] = [
+            self.row(indices[0], row),
+            self.row(indices[1], row),
+            self.row(indices[2], row),
+        ];
+        [
+            a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], 0.0, 0.0, 0.0,
+        ]
     }
 }
 
-/// Nine numbers of a rotation, column by column.
-type Vector9 = [f64; 9];
+/// Returns `Σ w (1, p, p pᵀ)` for each of some weights.
+#[inline(always)]
+fn sums<A: Arithmetic, const N: usize>(
+    arithmetic: A,
+    points: &Points,
+    weights_of: impl Fn(&Block) -> [Four<A>; N],
+) -> [Monomials; N] {
+    let mut sums = [[Four::splat(arithmetic, 0.0); MONOMIALS]; N];
+    for block in points.blocks {
+        let weights = weights_of(block);
+        let x = Four::new(arithmetic, block.marker[0]);
+        let y = Four::new(arithmetic, block.marker[1]);
+        let z = Four::new(arithmetic, block.marker[2]);
+        for k in 0..N {
+            let (w, sums) = (weights[k], &mut sums[k]);
+            let (xw, yw, zw) = (x * w, y * w, z * w);
+            sums[0] = sums[0] + w;
+            sums[1] = sums[1] + xw;
+            sums[2] = sums[2] + yw;
+            sums[3] = sums[3] + zw;
+            sums[4] = sums[4].plus(x, xw);
+            sums[5] = sums[5].plus(x, yw);
+            sums[6] = sums[6].plus(x, zw);
+            sums[7] = sums[7].plus(y, yw);
+            sums[8] = sums[8].plus(y, zw);
+            sums[9] = sums[9].plus(z, zw);
+        }
+        keep_in_memory(&mut sums);
+    }
+    let mut stored = [[0.0; MONOMIALS]; N];
+    for k in 0..N {
+        stored[k] = totals(&sums[k]);
+    }
+    stored
+}
 
 /// The collinearity error as a function of the rotation alone.
 #[derive(Debug, Clone)]
 pub(crate) struct CollinearityCost {
     /// Columns of `Ω`, which is symmetric.
-    omega: [Vector9; 9],
+    omega: [[f64; PADDED]; 9],
     /// Columns of `T`, from the rotation to the markers' mean in the camera.
-    centre_from_rotation: [[f64; 3]; 9],
+    centre_from_rotation: [Lane; 9],
 }
 
 impl CollinearityCost {
-    /// Returns the cost; none when the rays do not fix a position (all of them one and the same).
-    pub(crate) fn new(moments: &CollinearityMoments) -> Option<Self> {
-        let w_inverse = full(&moments.w).try_inverse()?;
-        let mut omega = [[0.0; 9]; 9];
-        let mut centre_from_rotation = [[0.0; 3]; 9];
-        for b in 0..3 {
-            let wa = full(&moments.pw[b]);
-            let t: Matrix3<f64> = -(w_inverse * wa);
-            for column in 0..3 {
-                centre_from_rotation[3 * b + column] = t.column(column).into();
+    /// A place for a cost.
+    pub(crate) const EMPTY: Self = Self {
+        omega: [[0.0; PADDED]; 9],
+        centre_from_rotation: [[0.0; LANES]; 9],
+    };
+
+    /// Makes this the cost of some points; none when their rays do not fix a position (all of them one
+    /// and the same).
+    #[inline(always)]
+    pub(crate) fn fill<A: Arithmetic>(
+        &mut self,
+        arithmetic: A,
+        moments: &CollinearityMoments,
+    ) -> Option<()> {
+        let s = &moments.sums;
+        let w = [s[0][0], s[1][0], s[2][0], s[3][0], s[4][0], s[5][0]];
+        let w_inverse = inverse(&w)?;
+        // Rows of ΣWA: entry 3 a + c belongs to column a, entry c, of the rotation.
+        let rows = [0, 1, 2].map(
+            #[inline(always)]
+            |k| moments.rows([1, 2, 3], k),
+        );
+        let wa = [
+            Twelve::new(arithmetic, &rows[0]),
+            Twelve::new(arithmetic, &rows[1]),
+            Twelve::new(arithmetic, &rows[2]),
+        ];
+        let factor = |value| Four::splat(arithmetic, value);
+        let mut t = [[0.0; PADDED]; 3];
+        for k in 0..3 {
+            let mut row = Twelve::zero(arithmetic);
+            for m in 0..3 {
+                row = row.minus(wa[m], factor(w_inverse[ENTRY[k][m]]));
             }
-            for a in 0..=b {
-                // Ω = Σ AᵀWA − (ΣWA)ᵀ (ΣW)⁻¹ (ΣWA), block by block.
-                let block = full(&moments.ppw[BLOCK[a][b]]) + full(&moments.pw[a]) * t;
-                for column in 0..3 {
-                    for row in 0..3 {
-                        omega[3 * b + column][3 * a + row] = block[(row, column)];
-                        omega[3 * a + row][3 * b + column] = block[(row, column)];
-                    }
-                }
-            }
+            t[k] = row.store();
         }
-        let is_finite = omega.iter().flatten().all(|value| value.is_finite());
-        is_finite.then_some(Self {
-            omega,
-            centre_from_rotation,
-        })
+        let mut trace = 0.0;
+        for j in 0..9 {
+            let (b, c) = (j / 3, j % 3);
+            let indices = [4 + ENTRY[0][b], 4 + ENTRY[1][b], 4 + ENTRY[2][b]];
+            let mut column = Twelve::new(arithmetic, &moments.rows(indices, c));
+            // Ω = Σ AᵀWA − (ΣWA)ᵀ (ΣW)⁻¹ (ΣWA).
+            for k in 0..3 {
+                column = column.plus(wa[k], factor(t[k][j]));
+                self.centre_from_rotation[j][k] = t[k][j];
+            }
+            self.omega[j] = column.store();
+            trace += self.omega[j][j];
+        }
+        // The diagonal bounds all the rest, which is a sum of squares in effect.
+        trace.is_finite().then_some(())
     }
 
     /// Returns `mat(Ω vec(R))`, half the gradient of the cost over the nine entries of `R`.
-    #[inline]
-    pub(crate) fn half_gradient(&self, rotation: &Rotation3<f64>) -> Matrix3<f64> {
-        let mut y = [0.0; 9];
-        for (column, r) in self.omega.iter().zip(rotation.matrix().as_slice()) {
-            for (y, entry) in y.iter_mut().zip(column) {
-                *y += entry * r;
-            }
+    #[inline(always)]
+    pub(crate) fn half_gradient<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        rotation: &Rotation3<f64>,
+    ) -> Matrix3<f64> {
+        let r = entries(rotation);
+        let mut y = Twelve::zero(arithmetic);
+        for j in 0..9 {
+            let column = Twelve::new(arithmetic, &self.omega[j]);
+            y = y.plus(column, Four::splat(arithmetic, r[j]));
         }
-        Matrix3::from_column_slice(&y)
+        let y = y.store();
+        Matrix3::new(y[0], y[3], y[6], y[1], y[4], y[7], y[2], y[5], y[8])
     }
 
     /// Returns `E(R) = rᵀ Ω r`.
-    #[inline]
-    pub(crate) fn value(&self, rotation: &Rotation3<f64>) -> f64 {
-        rotation.matrix().dot(&self.half_gradient(rotation))
+    #[inline(always)]
+    pub(crate) fn value<A: Arithmetic>(&self, arithmetic: A, rotation: &Rotation3<f64>) -> f64 {
+        rotation
+            .matrix()
+            .dot(&self.half_gradient(arithmetic, rotation))
     }
 
     /// Returns `Jᵀ Ω J` for the three turns `R [e_k]×`, `J` their columns as vectors.
     ///
     /// Turn `k` has two columns that are not zero: with `(i, j, k)` in cyclic order, column `i` is
     /// `r_j` and column `j` is `−r_i`.
-    #[inline]
-    pub(crate) fn curvature(&self, rotation: &Rotation3<f64>) -> Matrix3<f64> {
-        let r: &[f64; 9] = &std::array::from_fn(|i| rotation.matrix().as_slice()[i]);
-        let omega_j: [Vector9; 3] = std::array::from_fn(|k| {
+    #[inline(always)]
+    pub(crate) fn curvature<A: Arithmetic>(
+        &self,
+        arithmetic: A,
+        rotation: &Rotation3<f64>,
+    ) -> Matrix3<f64> {
+        let r = entries(rotation);
+        let mut omega_j = [[0.0; PADDED]; 3];
+        for k in 0..3 {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            let mut product = [0.0; 9];
+            let mut product = Twelve::zero(arithmetic);
             for row in 0..3 {
-                let (plus, minus) = (r[3 * j + row], r[3 * i + row]);
-                let (of_i, of_j) = (&self.omega[3 * i + row], &self.omega[3 * j + row]);
-                for (value, (a, b)) in product.iter_mut().zip(of_i.iter().zip(of_j)) {
-                    *value += a * plus - b * minus;
-                }
+                let of_i = Twelve::new(arithmetic, &self.omega[3 * i + row]);
+                let of_j = Twelve::new(arithmetic, &self.omega[3 * j + row]);
+                product = product.plus(of_i, Four::splat(arithmetic, r[3 * j + row]));
+                product = product.minus(of_j, Four::splat(arithmetic, r[3 * i + row]));
             }
-            product
-        });
-        Matrix3::from_fn(|k, l| {
+            omega_j[k] = product.store();
+        }
+        let entry = |k: usize, l: usize| -> f64 {
             let (i, j) = ((k + 1) % 3, (k + 2) % 3);
             let v = &omega_j[l];
-            (0..3)
-                .map(|row| r[3 * j + row] * v[3 * i + row] - r[3 * i + row] * v[3 * j + row])
-                .sum()
-        })
+            let mut sum = 0.0;
+            for row in 0..3 {
+                sum += r[3 * j + row] * v[3 * i + row] - r[3 * i + row] * v[3 * j + row];
+            }
+            sum
+        };
+        let (m21, m31, m32) = (entry(1, 0), entry(2, 0), entry(2, 1));
+        Matrix3::new(
+            entry(0, 0),
+            m21,
+            m31, //
+            m21,
+            entry(1, 1),
+            m32, //
+            m31,
+            m32,
+            entry(2, 2),
+        )
     }
 
     /// Returns where the markers' mean lies in the camera frame for a given rotation, m.
     ///
     /// # Source
     /// Ding, Wei, Wang 2011, Eq. (13), for centred points.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn centre_in_camera(&self, rotation: &Rotation3<f64>) -> Vector3<f64> {
-        let mut centre = Vector3::zeros();
-        for (column, r) in self
-            .centre_from_rotation
-            .iter()
-            .zip(rotation.matrix().as_slice())
-        {
-            centre += Vector3::from(*column) * *r;
+        let r = entries(rotation);
+        let mut centre = [0.0; LANES];
+        for j in 0..9 {
+            for k in 0..LANES {
+                centre[k] += self.centre_from_rotation[j][k] * r[j];
+            }
         }
-        centre
+        Vector3::new(centre[0], centre[1], centre[2])
     }
 }
 
-#[inline]
+/// Nine numbers of a rotation, column by column.
+#[inline(always)]
+fn entries(rotation: &Rotation3<f64>) -> [f64; 9] {
+    let m = rotation.matrix();
+    [
+        m.m11, m.m21, m.m31, m.m12, m.m22, m.m32, m.m13, m.m23, m.m33,
+    ]
+}
+
+/// Returns the inverse of a symmetric matrix; none for a singular one.
+#[inline(always)]
+fn inverse(s: &Symmetric3) -> Option<Symmetric3> {
+    let [m11, m12, m13, m22, m23, m33] = *s;
+    let (c11, c12, c13) = (
+        m22 * m33 - m23 * m23,
+        m13 * m23 - m12 * m33,
+        m12 * m23 - m13 * m22,
+    );
+    let determinant = m11 * c11 + m12 * c12 + m13 * c13;
+    let share = 1.0 / determinant;
+    let inverse = [
+        c11,
+        c12,
+        c13,
+        m11 * m33 - m13 * m13,
+        m12 * m13 - m11 * m23,
+        m11 * m22 - m12 * m12,
+    ]
+    .map(|cofactor| cofactor * share);
+    (determinant != 0.0).then_some(inverse)
+}
+
+#[cfg(test)]
 fn full(s: &Symmetric3) -> Matrix3<f64> {
     Matrix3::new(s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5])
 }
@@ -255,6 +428,8 @@ mod tests {
     use super::*;
     use crate::camera::{Camera, Pixel};
     use crate::estimation::Observation;
+    use crate::estimation::four::Plain;
+    use crate::estimation::points::Blocks;
     use crate::geometry::skew;
 
     /// Relative; sums of a handful of products.
@@ -305,9 +480,12 @@ mod tests {
     #[test]
     fn quadratic_form_equals_the_papers_sum_at_its_best_translation() {
         let (camera, observations, r) = example();
-        let points = Points::new(&camera, &observations).expect("points in general position");
-        let moments = CollinearityMoments::new(&points, Weighting::ObjectSpace);
-        let cost = CollinearityCost::new(&moments).expect("five different rays");
+        let mut room = Blocks::new();
+        let points = Points::new(Plain, &camera, &observations, &mut room)
+            .expect("points in general position");
+        let moments = CollinearityMoments::new(Plain, &points, Weighting::ObjectSpace);
+        let mut cost = CollinearityCost::EMPTY;
+        cost.fill(Plain, &moments).expect("five different rays");
         let rays: Vec<_> = observations
             .iter()
             .map(|seen| {
@@ -320,7 +498,7 @@ mod tests {
             .collect();
         let c = cost.centre_in_camera(&r);
         let literal = literal_error(&rays, &r, &c);
-        assert!((cost.value(&r) - literal).abs() < ROUNDING * literal);
+        assert!((cost.value(Plain, &r) - literal).abs() < ROUNDING * literal);
         // No neighbouring translation does better.
         for axis in 0..3 {
             for step in [-1e-4, 1e-4] {
@@ -334,14 +512,17 @@ mod tests {
     #[test]
     fn curvature_is_that_of_the_quadratic_form() {
         let (camera, observations, r) = example();
-        let points = Points::new(&camera, &observations).expect("points in general position");
-        let moments = CollinearityMoments::new(&points, Weighting::Image);
-        let cost = CollinearityCost::new(&moments).expect("five different rays");
+        let mut room = Blocks::new();
+        let points = Points::new(Plain, &camera, &observations, &mut room)
+            .expect("points in general position");
+        let moments = CollinearityMoments::new(Plain, &points, Weighting::Image);
+        let mut cost = CollinearityCost::EMPTY;
+        cost.fill(Plain, &moments).expect("five different rays");
         let form = |m: &Matrix3<f64>| {
             let unchecked = Rotation3::from_matrix_unchecked(*m);
-            cost.value(&unchecked)
+            cost.value(Plain, &unchecked)
         };
-        let curvature = cost.curvature(&r);
+        let curvature = cost.curvature(Plain, &r);
         for k in 0..3 {
             let turn = r.matrix() * skew(Vector3::ith(k, 1.0));
             let expected = form(&turn);
@@ -358,13 +539,15 @@ mod tests {
     #[test]
     fn every_weight_has_its_ray_as_null_space() {
         let (camera, observations, _) = example();
-        let points = Points::new(&camera, &observations).expect("points in general position");
-        for block in &points.blocks {
+        let mut room = Blocks::new();
+        let points = Points::new(Plain, &camera, &observations, &mut room)
+            .expect("points in general position");
+        for block in points.blocks {
             for weighting in [Weighting::ObjectSpace, Weighting::Image] {
-                let weights = weighting.of(block);
+                let weights = weighting.of(Plain, block);
                 for lane in 0..LANES {
                     let v = Vector3::new(block.ray[0][lane], block.ray[1][lane], 1.0);
-                    let w = full(&weights.map(|entry| entry[lane]));
+                    let w = full(&weights.map(|entry| entry.lane()[lane]));
                     assert!((w * v).norm() <= ROUNDING * w.norm());
                 }
             }
@@ -377,8 +560,11 @@ mod tests {
         for seen in &mut observations {
             seen.pixel = Pixel { u: 300.0, v: 200.0 };
         }
-        let points = Points::new(&camera, &observations).expect("the markers differ");
-        let moments = CollinearityMoments::new(&points, Weighting::Image);
-        assert!(CollinearityCost::new(&moments).is_none());
+        let mut room = Blocks::new();
+        let points =
+            Points::new(Plain, &camera, &observations, &mut room).expect("the markers differ");
+        let moments = CollinearityMoments::new(Plain, &points, Weighting::Image);
+        let mut cost = CollinearityCost::EMPTY;
+        assert!(cost.fill(Plain, &moments).is_none());
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
 use super::exclude;
 use super::initialise::{self, linear_rotation};
-use super::problem::Problem;
+use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
 use super::{EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Solution};
@@ -28,8 +28,8 @@ pub struct Estimator {
 }
 
 /// A fit with what is known about its rivals.
-struct Candidate {
-    fit: Fit,
+struct Judged<'a> {
+    fit: &'a Fit,
     ambiguity: f64,
     iterations: u16,
     initialisation: Initialisation,
@@ -114,7 +114,8 @@ impl Estimator {
                 need: self.settings.min_points,
             });
         }
-        let problem = Problem::new(camera, self.settings.refinement, observations)?;
+        let mut room = Room::new();
+        let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
         let nominal = || {
             let seed = &self.settings.nominal_camera_from_tanker;
             self.solve_from(&problem, seed, Initialisation::Nominal)
@@ -132,7 +133,7 @@ impl Estimator {
                 let seed = dlt_seed(camera, observations)?;
                 self.solve_from(&problem, &seed, start)
             }
-            (Initialisation::Global, _) => Ok(self.judge(&problem, &globally(&problem)?)),
+            (Initialisation::Global, _) => self.solve_globally(&problem),
         }
     }
 
@@ -166,27 +167,66 @@ impl Estimator {
         // The last attitude says nothing against a rival: it may have been the wrong one of the two.
         let prior = (initialisation == Initialisation::Nominal).then_some(seed);
         let cost = |fit: &Fit| fit.chi_squared + squared_turn(&fit.pose.rotation, prior);
-        let mut best = (fit, cost(&fit));
-        let mut rival = ambiguity::rival(problem, &fit).map(|rival| (rival, cost(&rival)));
-        if let Some(other) = &mut rival
-            && other.1 < best.1
-        {
-            std::mem::swap(other, &mut best);
-        }
-        let candidate = Candidate {
-            fit: best.0,
+        let rival = ambiguity::rival(problem, &fit);
+        let (best, other) = match &rival {
+            Some(rival) if cost(rival) < cost(&fit) => (rival, Some(&fit)),
+            rival => (&fit, rival.as_ref()),
+        };
+        let judged = Judged {
+            fit: best,
             // The prior chooses, but does not make the choice look surer than the image does.
-            ambiguity: rival.map_or(0.0, |(rival, _)| {
-                likelihood_ratio(rival.chi_squared, best.0.chi_squared)
+            ambiguity: other.map_or(0.0, |other| {
+                likelihood_ratio(other.chi_squared, best.chi_squared)
             }),
             iterations: minimum.iterations.saturating_add(fit.iterations),
             initialisation,
         };
-        Ok(self.judge(problem, &candidate))
+        Ok(self.judge(problem, &judged))
     }
 
-    fn judge(&self, problem: &Problem, candidate: &Candidate) -> Solution {
-        let fit = &candidate.fit;
+    /// The best of all minima in front of the camera, and the second best as its rival.
+    fn solve_globally(&self, problem: &Problem) -> Result<Solution, EstimateError> {
+        let minima = initialise::search(problem.cost, problem.step_tolerance());
+        let mut iterations = minima.iterations;
+        let mut ranking = Ranking::default();
+        // With every minimum behind the camera, that is the reason.
+        let mut failure = minima
+            .behind
+            .and_then(|minimum| problem.fit(&minimum.rotation).err())
+            .unwrap_or(EstimateError::NoConvergence { iterations });
+        for minimum in minima.in_front.iter().flatten() {
+            let best = ranking.best.map(|(fit, _)| fit.chi_squared);
+            let least = problem.least_chi_squared(minimum);
+            if matches!((best, least), (Some(best), Some(least)) if least > best + NEGLIGIBLE) {
+                continue;
+            }
+            match problem.fit(&minimum.rotation) {
+                Ok(fit) => {
+                    iterations = iterations.saturating_add(fit.iterations);
+                    ranking.consider(&fit, problem.merit(&fit));
+                }
+                Err(error) => failure = error,
+            }
+        }
+        let (fit, _) = ranking.best.ok_or(failure)?;
+        if let Some(rival) = ambiguity::rival(problem, &fit) {
+            ranking.consider(&rival, problem.merit(&rival));
+        }
+        let (fit, _) = ranking.best.unwrap_or((fit, 0.0));
+        let judged = Judged {
+            fit: &fit,
+            ambiguity: ranking.rival.map_or(0.0, |(rival, _)| {
+                likelihood_ratio(rival.chi_squared, fit.chi_squared)
+            }),
+            iterations,
+            initialisation: Initialisation::Global,
+        };
+        Ok(self.judge(problem, &judged))
+    }
+
+    #[inline(always)]
+    fn judge(&self, problem: &Problem, judged: &Judged) -> Solution {
+        let fit = judged.fit;
         let residuals = 2 * problem.observations.len();
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Solution {
@@ -196,9 +236,9 @@ impl Estimator {
             chi_squared: fit.chi_squared,
             degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),
             chi_squared_limit: self.limits.limit(residuals - 6),
-            iterations: candidate.iterations,
-            initialisation: candidate.initialisation,
-            ambiguity: candidate.ambiguity,
+            iterations: judged.iterations,
+            initialisation: judged.initialisation,
+            ambiguity: judged.ambiguity,
             excluded: Excluded::default(),
         }
     }
@@ -216,6 +256,29 @@ fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
 /// [`WEAK_SIGMA_RATIO`] times that of the third best. Any three fix a pose; what is much weaker than
 /// they are could not contradict them, so it gives no redundancy.
 fn count_checking(observations: &[Observation]) -> usize {
+    // Nearly always all sigmas are alike.
+    let (mut least, mut largest) = ([f64::INFINITY; 4], [0.0_f64; 4]);
+    let (fours, rest) = observations.as_chunks::<4>();
+    let mut look = |lane: usize, seen: &Observation| {
+        least[lane] = least[lane].min(seen.sigma_px);
+        largest[lane] = largest[lane].max(seen.sigma_px);
+    };
+    // Four limits in turn, so that none waits for the one before it.
+    for four in fours {
+        for lane in 0..4 {
+            look(lane, &four[lane]);
+        }
+    }
+    for seen in rest {
+        look(0, seen);
+    }
+    let least = least.into_iter().fold(f64::INFINITY, f64::min);
+    if largest
+        .iter()
+        .all(|sigma| *sigma <= WEAK_SIGMA_RATIO * least)
+    {
+        return observations.len();
+    }
     let mut best = [f64::INFINITY; 3];
     for seen in observations {
         if let Some(place) = best.iter().position(|sigma| seen.sigma_px < *sigma) {
@@ -267,45 +330,6 @@ fn dlt_seed(
         .collect::<Result<Vec<Ray>, _>>()?;
     let markers: Vec<_> = observations.iter().map(|o| o.marker_in_tanker).collect();
     linear_rotation(&rays, &markers)
-}
-
-/// The best of all minima in front of the camera, and the second best as its rival.
-fn globally(problem: &Problem) -> Result<Candidate, EstimateError> {
-    let minima = initialise::search(&problem.cost, problem.step_tolerance());
-    let mut iterations = minima.iterations;
-    let mut ranking = Ranking::default();
-    // With every minimum behind the camera, that is the reason.
-    let mut failure = minima
-        .behind
-        .and_then(|minimum| problem.fit(&minimum.rotation).err())
-        .unwrap_or(EstimateError::NoConvergence { iterations });
-    for minimum in minima.in_front.iter().flatten() {
-        let best = ranking.best.map(|(fit, _)| fit.chi_squared);
-        let least = problem.least_chi_squared(minimum);
-        if matches!((best, least), (Some(best), Some(least)) if least > best + NEGLIGIBLE) {
-            continue;
-        }
-        match problem.fit(&minimum.rotation) {
-            Ok(fit) => {
-                iterations = iterations.saturating_add(fit.iterations);
-                ranking.consider(&fit, problem.merit(&fit));
-            }
-            Err(error) => failure = error,
-        }
-    }
-    let (fit, _) = ranking.best.ok_or(failure)?;
-    if let Some(rival) = ambiguity::rival(problem, &fit) {
-        ranking.consider(&rival, problem.merit(&rival));
-    }
-    let (fit, _) = ranking.best.unwrap_or((fit, 0.0));
-    Ok(Candidate {
-        fit,
-        ambiguity: ranking.rival.map_or(0.0, |(rival, _)| {
-            likelihood_ratio(rival.chi_squared, fit.chi_squared)
-        }),
-        iterations,
-        initialisation: Initialisation::Global,
-    })
 }
 
 /// The best two of different poses, with their merits.

@@ -21,14 +21,14 @@ mod collinearity;
 mod covariance;
 mod estimator;
 mod exclude;
+mod four;
 mod initialise;
-mod lane;
-mod linearise;
 mod newton;
 mod orthogonal_iteration;
 mod points;
 mod problem;
 mod refine;
+mod residuals;
 mod symmetric6;
 mod trust;
 

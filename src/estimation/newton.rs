@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::collinearity::CollinearityCost;
+use super::four::{Arithmetic, Kernel, vectorised};
 use crate::geometry::{axial, cayley};
 
 /// Where a descent ended.
@@ -57,18 +58,50 @@ pub(crate) fn minimise_below(
     step_tolerance: f64,
     limit: f64,
 ) -> Option<Minimum> {
+    vectorised(Descent {
+        cost,
+        seed,
+        step_tolerance,
+        limit,
+    })
+}
+
+struct Descent<'a> {
+    cost: &'a CollinearityCost,
+    seed: &'a Rotation3<f64>,
+    step_tolerance: f64,
+    limit: f64,
+}
+
+impl Kernel for Descent<'_> {
+    type Output = Option<Minimum>;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Option<Minimum> {
+        descend(arithmetic, &self)
+    }
+}
+
+#[inline(always)]
+fn descend<A: Arithmetic>(arithmetic: A, descent: &Descent) -> Option<Minimum> {
+    let &Descent {
+        cost,
+        seed,
+        step_tolerance,
+        limit,
+    } = descent;
     let mut rotation = *seed;
-    let mut y = cost.half_gradient(&rotation);
+    let mut y = cost.half_gradient(arithmetic, &rotation);
     let mut value = rotation.matrix().dot(&y);
     for iteration in 1..=MAX_ITERATIONS {
-        let NewtonStep { mut step, promise } = newton_step(cost, &rotation, &y);
+        let NewtonStep { mut step, promise } = newton_step(arithmetic, cost, &rotation, &y);
         if promise.is_some_and(|gain| value - gain > HOPELESS * limit) {
             return None;
         }
         let mut halvings = 0;
         loop {
             let trial = rotation * cayley(step);
-            let trial_y = cost.half_gradient(&trial);
+            let trial_y = cost.half_gradient(arithmetic, &trial);
             let trial_value = trial.matrix().dot(&trial_y);
             if trial_value <= value || step.norm() < TRUSTED_STEP {
                 (rotation, y, value) = (trial, trial_y, trial_value);
@@ -109,13 +142,18 @@ struct NewtonStep {
     promise: Option<f64>,
 }
 
-#[inline]
-fn newton_step(cost: &CollinearityCost, rotation: &Rotation3<f64>, y: &Matrix3<f64>) -> NewtonStep {
+#[inline(always)]
+fn newton_step<A: Arithmetic>(
+    arithmetic: A,
+    cost: &CollinearityCost,
+    rotation: &Rotation3<f64>,
+    y: &Matrix3<f64>,
+) -> NewtonStep {
     let r = rotation.matrix();
     let a = r.tr_mul(y);
     let gradient = axial(&a);
-    let hessian =
-        cost.curvature(rotation) + (a + a.transpose()) * 0.5 - Matrix3::identity() * a.trace();
+    let hessian = cost.curvature(arithmetic, rotation) + (a + a.transpose()) * 0.5
+        - Matrix3::identity() * a.trace();
     let (step, is_convex) = match solve_positive(&hessian, &gradient) {
         Some(solution) => (-solution, true),
         None => (-solve_lifted(&hessian, &gradient), false),
@@ -133,7 +171,7 @@ fn newton_step(cost: &CollinearityCost, rotation: &Rotation3<f64>, y: &Matrix3<f
 }
 
 /// Returns `H⁻¹ g` by `L D Lᵀ`; none unless the matrix is positive definite.
-#[inline]
+#[inline(always)]
 fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
     let d1 = h.m11;
     let (l21, l31) = (h.m21 / d1, h.m31 / d1);
@@ -152,6 +190,7 @@ fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
 }
 
 /// Solves with the Hessian, lifted until it is positive definite so that the step descends.
+#[cold]
 fn solve_lifted(hessian: &Matrix3<f64>, gradient: &Vector3<f64>) -> Vector3<f64> {
     let scale = hessian.norm().max(f64::MIN_POSITIVE);
     let mut lift = 0.01 * scale;

@@ -8,8 +8,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 use super::EstimateError;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
+use super::four::Plain;
 use super::newton::{self, Minimum};
-use super::points::{Points, mean};
+use super::points::{Blocks, Points, mean};
 use crate::camera::Ray;
 use crate::geometry::{nearest_rotation, nearest_rotation_by_svd};
 
@@ -70,7 +71,7 @@ pub fn iterate_literally(
             .sum();
         inverse * sum / n // Eq. (13)
     };
-    let p_mean = mean(markers_in_tanker.iter());
+    let p_mean = mean(markers_in_tanker, |marker| marker);
     let mut rotation = *seed;
     let mut iterations = 0;
     let mut converged = false;
@@ -124,7 +125,8 @@ pub fn iterate_accelerated(
     let mut iterations = 0;
     let mut converged = false;
     while iterations < max_iterations && !converged {
-        let next = nearest_rotation(&(rotation.matrix() * scatter - cost.half_gradient(&rotation)));
+        let next =
+            nearest_rotation(&(rotation.matrix() * scatter - cost.half_gradient(Plain, &rotation)));
         iterations += 1;
         converged = turn(&rotation, &next) < tolerance_rad;
         rotation = next;
@@ -160,9 +162,11 @@ fn cost(
     rays: &[Ray],
     markers_in_tanker: &[Point3<f64>],
 ) -> Result<(CollinearityCost, Point3<f64>), EstimateError> {
-    let points = Points::from_rays(rays, markers_in_tanker);
-    let moments = CollinearityMoments::new(&points, Weighting::ObjectSpace);
-    let cost = CollinearityCost::new(&moments).ok_or(EstimateError::SAME_RAYS)?;
+    let mut room = Blocks::new();
+    let points = Points::from_rays(rays, markers_in_tanker, &mut room);
+    let moments = CollinearityMoments::new(Plain, &points, Weighting::ObjectSpace);
+    let mut cost = CollinearityCost::EMPTY;
+    cost.fill(Plain, &moments).ok_or(EstimateError::SAME_RAYS)?;
     Ok((cost, points.mean))
 }
 

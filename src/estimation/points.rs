@@ -3,37 +3,36 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use smallvec::SmallVec;
 
+use super::four::{Arithmetic, Four, LANES, Lane, Number, Plain, totals};
 use super::{EstimateError, Observation};
 use crate::camera::{Camera, Ray};
 
-/// Points in a block: one AVX register of doubles, or two of SSE2 or Neon.
-pub(crate) const LANES: usize = 4;
-/// One number of each point of a block.
-pub(crate) type Lane = [f64; LANES];
 /// Blocks kept without the heap: 64 points.
 const INLINE_BLOCKS: usize = 16;
+/// Room for a frame's blocks; six kilobytes that are filled where they stand, never moved.
+pub(crate) type Blocks = SmallVec<[Block; INLINE_BLOCKS]>;
 /// Least second moment of the markers about their line, relative to the first: a thousandth in length.
 const MIN_WIDTH_SHARE: f64 = 1e-6;
 
-/// Four points. What is missing to four at the end has no weight and lies in the markers' mean.
+/// Four points. What is missing to four at the end has no weight and its marker lies in the mean.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Block {
     /// Marker from the markers' mean, tanker frame, m.
     pub(crate) marker: [Lane; 3],
     /// Measured ray: x, y on the plane `z = 1`.
     pub(crate) ray: [Lane; 2],
-    /// Inverse covariance of the measured ray: 11, 12, 22.
+    /// Inverse covariance of the measured ray: 11, 12, 22; a pinhole has no 12.
     pub(crate) information: [Lane; 3],
-    /// Focal length over sigma, for columns and rows of a pinhole.
-    pub(crate) whitening: [Lane; 2],
     /// px²; zero where there is no point.
     pub(crate) variance: Lane,
 }
 
 /// All points of a frame.
 #[derive(Debug)]
-pub(crate) struct Points {
-    pub(crate) blocks: SmallVec<[Block; INLINE_BLOCKS]>,
+pub(crate) struct Points<'a> {
+    pub(crate) blocks: &'a [Block],
+    /// Information of rows over that of columns, for a camera without distortion: the same for all points.
+    pub(crate) row_by_column_information: Option<f64>,
     /// Mean of the markers, the reference point of all fits, m, tanker frame.
     pub(crate) mean: Point3<f64>,
     /// Distance of the farthest marker from their mean, m.
@@ -47,148 +46,225 @@ impl Block {
         marker: [[0.0; LANES]; 3],
         ray: [[0.0; LANES]; 2],
         information: [[0.0; LANES]; 3],
-        whitening: [[0.0; LANES]; 2],
         variance: [0.0; LANES],
     };
 
-    fn put(&mut self, lane: usize, point: &MeasuredPoint) {
-        for (axis, value) in self.marker.iter_mut().zip(point.marker) {
-            axis[lane] = value;
+    #[inline(always)]
+    fn put_marker(&mut self, lane: usize, marker: &Point3<f64>, mean: &Point3<f64>) {
+        for axis in 0..3 {
+            self.marker[axis][lane] = marker[axis] - mean[axis];
         }
+    }
+
+    fn put_measurement(&mut self, lane: usize, point: &Measurement) {
         self.ray[0][lane] = point.ray.x;
         self.ray[1][lane] = point.ray.y;
         for (entry, value) in self.information.iter_mut().zip(point.information) {
-            entry[lane] = value;
-        }
-        for (entry, value) in self.whitening.iter_mut().zip(point.whitening) {
             entry[lane] = value;
         }
         self.variance[lane] = point.variance;
     }
 }
 
-struct MeasuredPoint {
-    marker: [f64; 3],
+struct Measurement {
     ray: Ray,
     information: [f64; 3],
-    whitening: [f64; 2],
     variance: f64,
 }
 
-impl Points {
+impl<'a> Points<'a> {
     /// Returns the points with their rays, about the markers' mean.
     ///
     /// # Errors
     /// [`EstimateError::NoRay`], or [`EstimateError::Degenerate`] for markers on one line, about
     /// which the tanker could turn freely.
+    #[inline(always)]
     pub(crate) fn new(
+        arithmetic: impl Arithmetic,
         camera: &Camera,
         observations: &[Observation],
+        room: &'a mut Blocks,
     ) -> Result<Self, EstimateError> {
-        let mean = mean(observations.iter().map(|seen| &seen.marker_in_tanker));
-        let (scatter, radius) =
-            spread(observations.iter().map(|seen| seen.marker_in_tanker - mean));
-        check_spread(&scatter)?;
-        let mut blocks = SmallVec::new();
+        let mean = mean(observations, |seen| &seen.marker_in_tanker);
+        room.clear();
+        room.reserve(observations.len().div_ceil(LANES));
+        let pinhole = camera.pinhole();
         for four in observations.chunks(LANES) {
             let mut block = Block::EMPTY;
-            for (lane, seen) in four.iter().enumerate() {
-                block.put(lane, &measure(camera, seen, &mean)?);
+            let is_measured = pinhole
+                .is_some_and(|pinhole| measure_four(arithmetic, pinhole, &mean, four, &mut block));
+            if !is_measured {
+                for (lane, seen) in four.iter().enumerate() {
+                    block.put_marker(lane, &seen.marker_in_tanker, &mean);
+                    block.put_measurement(lane, &measure(camera, seen)?);
+                }
             }
-            blocks.push(block);
+            room.push(block);
         }
-        Ok(Self {
-            blocks,
-            mean,
-            radius,
-            scatter,
-        })
+        let ratio = pinhole.map(|[fx, fy, ..]| (fy / fx).powi(2));
+        let points = Self::about(arithmetic, mean, ratio, room);
+        check_spread(&points.scatter)?;
+        Ok(points)
     }
-}
 
-impl Points {
     /// Returns points whose rays are given, all of the same weight.
-    pub(crate) fn from_rays(rays: &[Ray], markers_in_tanker: &[Point3<f64>]) -> Self {
-        let mean = mean(markers_in_tanker.iter());
-        let mut blocks = SmallVec::new();
+    pub(crate) fn from_rays(
+        rays: &[Ray],
+        markers_in_tanker: &[Point3<f64>],
+        room: &'a mut Blocks,
+    ) -> Self {
+        let mean = mean(markers_in_tanker, |marker| marker);
+        room.clear();
         for (rays, markers) in rays.chunks(LANES).zip(markers_in_tanker.chunks(LANES)) {
             let mut block = Block::EMPTY;
             for (lane, (ray, marker)) in rays.iter().zip(markers).enumerate() {
-                let point = MeasuredPoint {
-                    marker: (marker - mean).into(),
+                block.put_marker(lane, marker, &mean);
+                let measurement = Measurement {
                     ray: *ray,
                     information: [1.0, 0.0, 1.0],
-                    whitening: [1.0; 2],
                     variance: 1.0,
                 };
-                block.put(lane, &point);
+                block.put_measurement(lane, &measurement);
             }
-            blocks.push(block);
+            room.push(block);
         }
-        let (scatter, radius) = spread(markers_in_tanker.iter().map(|marker| marker - mean));
+        Self::about(Plain, mean, Some(1.0), room)
+    }
+
+    #[inline(always)]
+    fn about(
+        arithmetic: impl Arithmetic,
+        mean: Point3<f64>,
+        row_by_column_information: Option<f64>,
+        blocks: &'a [Block],
+    ) -> Self {
+        let mut moments = [Four::splat(arithmetic, 0.0); 6];
+        let mut longest = [0.0_f64; LANES];
+        for block in blocks {
+            let [x, y, z] = [
+                Four::new(arithmetic, block.marker[0]),
+                Four::new(arithmetic, block.marker[1]),
+                Four::new(arithmetic, block.marker[2]),
+            ];
+            let length = (x * x).plus(y, y).plus(z, z).lane();
+            for i in 0..LANES {
+                longest[i] = if length[i] > longest[i] {
+                    length[i]
+                } else {
+                    longest[i]
+                };
+            }
+            let pairs = [(x, x), (x, y), (x, z), (y, y), (y, z), (z, z)];
+            for (moment, (a, b)) in moments.iter_mut().zip(pairs) {
+                *moment = moment.plus(a, b);
+            }
+        }
+        let [xx, xy, xz, yy, yz, zz] = totals(&moments);
         Self {
             blocks,
+            row_by_column_information,
             mean,
-            radius,
-            scatter,
+            radius: longest.into_iter().fold(0.0, f64::max).sqrt(),
+            scatter: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
         }
     }
 }
 
-#[inline]
-fn measure(
-    camera: &Camera,
-    seen: &Observation,
+/// Fills in what a camera without distortion measured; false when a pixel has no ray.
+#[inline(always)]
+fn measure_four(
+    arithmetic: impl Arithmetic,
+    [fx, fy, cx, cy]: [f64; 4],
     mean: &Point3<f64>,
-) -> Result<MeasuredPoint, EstimateError> {
+    four: &[Observation],
+    block: &mut Block,
+) -> bool {
+    // What is missing to four repeats the last point, without any weight.
+    let seen = match four {
+        [a, b, c, d] => [a, b, c, d],
+        [a, b, c] => [a, b, c, c],
+        [a, b] => [a, b, b, b],
+        [a] => [a, a, a, a],
+        _ => return true,
+    };
+    let count = four.len();
+    let there = [0, 1, 2, 3].map(
+        #[inline(always)]
+        |lane| if lane < count { 1.0 } else { 0.0 },
+    );
+    let splat = |value| Four::splat(arithmetic, value);
+    let load = |lane| Four::new(arithmetic, lane);
+    let there = load(there);
+    for axis in 0..3 {
+        let marker = load([
+            seen[0].marker_in_tanker[axis],
+            seen[1].marker_in_tanker[axis],
+            seen[2].marker_in_tanker[axis],
+            seen[3].marker_in_tanker[axis],
+        ]);
+        block.marker[axis] = ((marker - splat(mean[axis])) * there).lane();
+    }
+    let u = load([
+        seen[0].pixel.u,
+        seen[1].pixel.u,
+        seen[2].pixel.u,
+        seen[3].pixel.u,
+    ]);
+    let v = load([
+        seen[0].pixel.v,
+        seen[1].pixel.v,
+        seen[2].pixel.v,
+        seen[3].pixel.v,
+    ]);
+    let sigma = load([
+        seen[0].sigma_px,
+        seen[1].sigma_px,
+        seen[2].sigma_px,
+        seen[3].sigma_px,
+    ]);
+    let x = (u - splat(cx)) * splat(1.0 / fx);
+    let y = (v - splat(cy)) * splat(1.0 / fy);
+    let inverse_sigma = there / sigma;
+    let (wu, wv) = (splat(fx) * inverse_sigma, splat(fy) * inverse_sigma);
+    block.ray = [x.lane(), y.lane()];
+    block.information = [(wu * wu).lane(), [0.0; LANES], (wv * wv).lane()];
+    block.variance = (sigma * sigma * there).lane();
+    // A sum is finite only if its terms are; one of them too large is left to the careful way.
+    (x + y).total().is_finite()
+}
+
+fn measure(camera: &Camera, seen: &Observation) -> Result<Measurement, EstimateError> {
     let no_ray = |cause| EstimateError::NoRay { id: seen.id, cause };
     let ray = camera.ray_from_pixel(seen.pixel).map_err(no_ray)?;
-    let inverse_sigma = 1.0 / seen.sigma_px;
-    let (information, whitening) = if let Some([fx, fy, ..]) = camera.pinhole() {
-        let whitening = [fx * inverse_sigma, fy * inverse_sigma];
-        (
-            [
-                whitening[0] * whitening[0],
-                0.0,
-                whitening[1] * whitening[1],
-            ],
-            whitening,
-        )
-    } else {
-        // A pixel that has a ray has a derivative there.
-        let (_, by_ray) = camera.project(ray).ok_or(EstimateError::SINGULAR)?;
-        let whitened = by_ray * inverse_sigma;
-        let information = whitened.tr_mul(&whitened);
-        (
-            [information.m11, information.m12, information.m22],
-            [0.0; 2],
-        )
-    };
-    Ok(MeasuredPoint {
-        marker: (seen.marker_in_tanker - mean).into(),
+    // A pixel that has a ray has a derivative there.
+    let (_, by_ray) = camera.project(ray).ok_or(EstimateError::SINGULAR)?;
+    let whitened = by_ray / seen.sigma_px;
+    let information = whitened.tr_mul(&whitened);
+    Ok(Measurement {
         ray,
-        information,
-        whitening,
+        information: [information.m11, information.m12, information.m22],
         variance: seen.sigma_px * seen.sigma_px,
     })
 }
 
-/// Returns the mean of the markers, m.
-#[inline]
-pub(crate) fn mean<'a>(points: impl ExactSizeIterator<Item = &'a Point3<f64>>) -> Point3<f64> {
-    let share = 1.0 / points.len() as f64;
-    Point3::from(points.fold(Vector3::zeros(), |sum, p| sum + p.coords) * share)
+/// Returns the mean of some markers, m.
+#[inline(always)]
+pub(crate) fn mean<T>(items: &[T], marker: impl Fn(&T) -> &Point3<f64>) -> Point3<f64> {
+    // Four sums in turn, so that no addition waits for the one before it.
+    let mut sums = [Vector3::zeros(); LANES];
+    let (fours, rest) = items.as_chunks::<LANES>();
+    for four in fours {
+        for lane in 0..LANES {
+            sums[lane] += marker(&four[lane]).coords;
+        }
+    }
+    for item in rest {
+        sums[0] += marker(item).coords;
+    }
+    Point3::from(((sums[0] + sums[1]) + (sums[2] + sums[3])) / items.len() as f64)
 }
 
-/// Second moments of the arms, m², and the length of the longest, m.
-#[inline]
-fn spread(arms: impl Iterator<Item = Vector3<f64>>) -> (Matrix3<f64>, f64) {
-    let (scatter, squared) = arms.fold((Matrix3::zeros(), 0.0_f64), |(sum, longest), arm| {
-        (sum + arm * arm.transpose(), longest.max(arm.norm_squared()))
-    });
-    (scatter, squared.sqrt())
-}
-
+#[inline(always)]
 fn check_spread(s: &Matrix3<f64>) -> Result<(), EstimateError> {
     // The second invariant is about the product of the two largest eigenvalues.
     let second = s.m11 * s.m22 + s.m22 * s.m33 + s.m33 * s.m11

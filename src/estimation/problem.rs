@@ -4,9 +4,10 @@ use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
 
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
-use super::linearise::{LensResiduals, PinholeResiduals};
-use super::points::Points;
+use super::four::{Arithmetic, Kernel, Plain, vectorised};
+use super::points::{Blocks, Points};
 use super::refine::{self, CentredPose, Fit, FitFailure};
+use super::residuals::{LensResiduals, PinholeResiduals};
 use super::{EstimateError, Observation, Refinement, newton};
 use crate::camera::Camera;
 
@@ -21,8 +22,67 @@ pub(crate) struct Problem<'a> {
     camera: &'a Camera,
     refinement: Refinement,
     pub(crate) observations: &'a [Observation],
-    pub(crate) points: Points,
-    pub(crate) cost: CollinearityCost,
+    pub(crate) points: Points<'a>,
+    pub(crate) cost: &'a CollinearityCost,
+}
+
+/// Where a problem's numbers stand: seven kilobytes that are filled in place and never moved.
+pub(crate) struct Room {
+    blocks: Blocks,
+    cost: CollinearityCost,
+}
+
+impl Room {
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self {
+            blocks: Blocks::new(),
+            cost: CollinearityCost::EMPTY,
+        }
+    }
+}
+
+/// From pixels to the cost.
+struct Preparation<'a, 'b> {
+    camera: &'a Camera,
+    observations: &'a [Observation],
+    weighting: Weighting,
+    blocks: &'a mut Blocks,
+    cost: &'b mut CollinearityCost,
+}
+
+impl<'a> Kernel for Preparation<'a, '_> {
+    type Output = Result<Points<'a>, EstimateError>;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+        let points = Points::new(arithmetic, self.camera, self.observations, self.blocks)?;
+        let moments = CollinearityMoments::new(arithmetic, &points, self.weighting);
+        self.cost
+            .fill(arithmetic, &moments)
+            .ok_or(EstimateError::SAME_RAYS)?;
+        Ok(points)
+    }
+}
+
+/// Maximum likelihood of a camera without distortion.
+struct PinholeFit<'a> {
+    problem: &'a Problem<'a>,
+    start: CentredPose,
+}
+
+impl Kernel for PinholeFit<'_> {
+    type Output = Result<Fit, EstimateError>;
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+        let residuals = PinholeResiduals {
+            arithmetic,
+            points: &self.problem.points,
+        };
+        refine::maximum_likelihood(&residuals, self.start)
+            .map_err(|failure| self.problem.explain(failure, &self.start))
+    }
 }
 
 impl<'a> Problem<'a> {
@@ -32,14 +92,20 @@ impl<'a> Problem<'a> {
         camera: &'a Camera,
         refinement: Refinement,
         observations: &'a [Observation],
+        room: &'a mut Room,
     ) -> Result<Self, EstimateError> {
-        let points = Points::new(camera, observations)?;
         let weighting = match refinement {
             Refinement::None => Weighting::ObjectSpace,
             Refinement::MaximumLikelihood => Weighting::Image,
         };
-        let moments = CollinearityMoments::new(&points, weighting);
-        let cost = CollinearityCost::new(&moments).ok_or(EstimateError::SAME_RAYS)?;
+        let Room { blocks, cost } = room;
+        let points = vectorised(Preparation {
+            camera,
+            observations,
+            weighting,
+            blocks,
+            cost,
+        })?;
         Ok(Self {
             camera,
             refinement,
@@ -59,7 +125,7 @@ impl<'a> Problem<'a> {
 
     /// Returns the minimum in whose basin `seed` lies.
     pub(crate) fn descend(&self, seed: &Rotation3<f64>) -> Result<newton::Minimum, EstimateError> {
-        let minimum = newton::minimise(&self.cost, seed, self.step_tolerance());
+        let minimum = newton::minimise(self.cost, seed, self.step_tolerance());
         if minimum.converged {
             Ok(minimum)
         } else {
@@ -83,7 +149,7 @@ impl<'a> Problem<'a> {
                 chi_squared * depth * depth
             }
         };
-        newton::minimise_below(&self.cost, seed, self.step_tolerance(), limit)
+        newton::minimise_below(self.cost, seed, self.step_tolerance(), limit)
             .filter(|minimum| minimum.converged)
     }
 
@@ -94,16 +160,20 @@ impl<'a> Problem<'a> {
             centre_in_camera: self.cost.centre_in_camera(rotation),
         };
         let fit = match self.refinement {
-            Refinement::None => self.as_it_is(start)?,
-            Refinement::MaximumLikelihood => if self.camera.is_pinhole() {
-                refine::maximum_likelihood(&PinholeResiduals(&self.points), start)
-            } else {
+            Refinement::None => self.as_it_is(start),
+            Refinement::MaximumLikelihood if self.camera.is_pinhole() => vectorised(PinholeFit {
+                problem: self,
+                start,
+            }),
+            Refinement::MaximumLikelihood => {
                 refine::maximum_likelihood(&self.lens_residuals(), start)
+                    .map_err(|failure| self.explain(failure, &start))
             }
-            .map_err(|failure| self.explain(failure, &start))?,
         };
-        self.check_in_front(&fit.pose)?;
-        Ok(fit)
+        if let Ok(fit) = &fit {
+            self.check_in_front(&fit.pose)?;
+        }
+        fit
     }
 
     /// The paper's own estimate, with the covariance that it really has.
@@ -143,7 +213,7 @@ impl<'a> Problem<'a> {
     pub(crate) fn merit(&self, fit: &Fit) -> f64 {
         match self.refinement {
             Refinement::MaximumLikelihood => fit.chi_squared,
-            Refinement::None => self.cost.value(&fit.pose.rotation),
+            Refinement::None => self.cost.value(Plain, &fit.pose.rotation),
         }
     }
 
@@ -175,6 +245,7 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
+    #[cold]
     fn explain(&self, failure: FitFailure, start: &CentredPose) -> EstimateError {
         match failure {
             FitFailure::Singular => EstimateError::SINGULAR,

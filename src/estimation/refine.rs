@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Rotation3, Vector3};
 
-use super::linearise::{Linearised, Residuals};
+use super::residuals::{Residuals, Slope};
 use super::symmetric6::{Factor, Vector};
 use crate::geometry::cayley;
 
@@ -16,6 +16,8 @@ pub(crate) const MAX_ITERATIONS: u16 = 50;
 const GAIN_TOLERANCE: f64 = 1e-6;
 /// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
+/// rad, and share of the distance; a shorter step leaves the information as it is, to a thousandth.
+const NEAR: f64 = 3e-4;
 /// Damping at which no step in any direction helps any more.
 const MAX_DAMPING: f64 = 1e9;
 
@@ -53,6 +55,7 @@ pub(crate) enum FitFailure {
 /// # Source
 /// `D = (1/z) [fx 0 −fx x; 0 fy −fy y]` for a pinhole, the lens model's derivative times
 /// `(1/z) [1 0 −x; 0 1 −y]` in general; `J = [−D [R p]×, D]`, weighted by each point's sigma.
+#[inline(always)]
 pub(crate) fn maximum_likelihood(
     residuals: &impl Residuals,
     start: CentredPose,
@@ -71,14 +74,25 @@ pub(crate) fn maximum_likelihood(
             }
             return Err(FitFailure::Singular);
         };
-        let step = factor.solve(&here.gradient).map(|value| -value);
-        let gain = -dot(&step, &here.gradient);
-        if damping == 0.0 && gain < GAIN_TOLERANCE.max(ROUNDING * here.chi_squared) {
-            return finish(&pose.moved(&step), &here, gain, &factor, iteration);
+        let step = factor.solve(&here.slope.gradient).map(|value| -value);
+        let gain = -dot(&step, &here.slope.gradient);
+        if damping == 0.0 && gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
+            return finish(&pose.moved(&step), &here.slope, gain, &factor, iteration);
         }
         let trial = pose.moved(&step);
+        if damping == 0.0
+            && pose.is_near(&step)
+            && let Some(there) = residuals.slope(&trial)
+            && there.chi_squared <= here.slope.chi_squared
+        {
+            let last = factor.solve(&there.gradient).map(|value| -value);
+            let gain = -dot(&last, &there.gradient);
+            if gain < GAIN_TOLERANCE.max(ROUNDING * there.chi_squared) {
+                return finish(&trial.moved(&last), &there, gain, &factor, iteration + 1);
+            }
+        }
         match residuals.linearise(&trial) {
-            Some(there) if there.chi_squared <= here.chi_squared => {
+            Some(there) if there.slope.chi_squared <= here.slope.chi_squared => {
                 (pose, here) = (trial, there);
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
             }
@@ -93,9 +107,10 @@ pub(crate) fn maximum_likelihood(
     Err(FitFailure::NotConverged)
 }
 
+#[inline(always)]
 fn finish(
     pose: &CentredPose,
-    here: &Linearised,
+    here: &Slope,
     gain: f64,
     factor: &Factor,
     iterations: u16,
@@ -120,11 +135,21 @@ fn finish(
     })
 }
 
+#[inline(always)]
 fn dot(a: &Vector, b: &Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl CentredPose {
+    /// Returns whether a step changes the information by no more than about a thousandth.
+    #[inline(always)]
+    fn is_near(&self, step: &Vector) -> bool {
+        let turn = Vector3::new(step[0], step[1], step[2]).norm_squared();
+        let motion = Vector3::new(step[3], step[4], step[5]).norm_squared();
+        turn < NEAR * NEAR && motion < (NEAR * self.centre_in_camera.z).powi(2)
+    }
+
+    #[inline(always)]
     pub(crate) fn moved(&self, step: &Vector) -> Self {
         Self {
             rotation: cayley(Vector3::new(step[0], step[1], step[2])) * self.rotation,
@@ -139,5 +164,5 @@ pub(crate) fn squared_residuals(
     pose: &CentredPose,
 ) -> Option<(f64, f64)> {
     let here = residuals.linearise(pose)?;
-    Some((here.chi_squared, here.squared_residuals_px))
+    Some((here.slope.chi_squared, here.slope.squared_residuals_px))
 }

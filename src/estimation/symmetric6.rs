@@ -17,7 +17,7 @@ pub(crate) struct Factor {
 impl Factor {
     /// Returns the factors of a symmetric matrix, of which the lower triangle is read; none unless it
     /// is positive definite, and far enough from singular for its inverse to mean something.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(a: &[[f64; 6]; 6]) -> Option<Self> {
         let mut l = [[0.0; 6]; 6];
         let mut inverse_d = [0.0; 6];
@@ -51,7 +51,7 @@ impl Factor {
     }
 
     /// Returns `A⁻¹ b`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn solve(&self, b: &Vector) -> Vector {
         let mut x = *b;
         for i in 0..6 {
@@ -71,7 +71,7 @@ impl Factor {
     }
 
     /// Returns `A⁻¹`, exactly symmetric.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn inverse(&self) -> Matrix6<f64> {
         // Columns of L⁻¹, below the ones of its diagonal.
         let mut m = [[0.0; 6]; 6];

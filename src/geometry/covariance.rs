@@ -1,6 +1,6 @@
 //! The one home of what a pose error is and in which order its covariance stands.
 
-use nalgebra::{Isometry3, Matrix6, Rotation3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Vector6};
 
 use super::rotation::skew;
 
@@ -61,12 +61,35 @@ impl PoseCovariance {
         lever: &nalgebra::Vector3<f64>,
     ) -> Self {
         // t = c − R l, and δ(R l) = δθ × lever, so δt = δc + lever × δθ.
-        let mut j = Matrix6::zeros();
-        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(*lever));
-        j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-        j.fixed_view_mut::<3, 3>(3, 0).fill_with_identity();
-        let covariance = j * rotation_then_point * j.transpose();
-        Self((covariance + covariance.transpose()) * 0.5)
+        let m = rotation_then_point;
+        let block = |row, column| {
+            Matrix3::new(
+                m[(row, column)],
+                m[(row, column + 1)],
+                m[(row, column + 2)], //
+                m[(row + 1, column)],
+                m[(row + 1, column + 1)],
+                m[(row + 1, column + 2)], //
+                m[(row + 2, column)],
+                m[(row + 2, column + 1)],
+                m[(row + 2, column + 2)],
+            )
+        };
+        let lever = skew(*lever);
+        let (turn, point_by_turn) = (block(0, 0), block(3, 0));
+        let mixed = point_by_turn + lever * turn;
+        let moved = lever * point_by_turn.transpose();
+        let position = block(3, 3) + (moved + moved.transpose()) + lever * turn * lever.transpose();
+        let mut covariance = Matrix6::zeros();
+        for row in 0..3 {
+            for column in 0..3 {
+                covariance[(row, column)] = position[(row.min(column), row.max(column))];
+                covariance[(3 + row, 3 + column)] = turn[(row, column)];
+                covariance[(row, 3 + column)] = mixed[(row, column)];
+                covariance[(3 + column, row)] = mixed[(row, column)];
+            }
+        }
+        Self(covariance)
     }
 }
 

@@ -9,6 +9,7 @@ pub fn skew(v: Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Returns the vector `a` with `skew(a) = m − mᵀ`.
+#[inline(always)]
 #[must_use]
 pub fn axial(m: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12)
@@ -17,13 +18,26 @@ pub fn axial(m: &Matrix3<f64>) -> Vector3<f64> {
 /// Returns the rotation `cay(w) = (I − [w]×/2)⁻¹ (I + [w]×/2)`, which is `Exp(w)` to second order.
 ///
 /// It needs no sine, and is a rotation to machine precision for every finite `w` (radians).
+#[inline(always)]
 #[must_use]
 pub fn cayley(w: Vector3<f64>) -> Rotation3<f64> {
     let a = w * 0.5;
-    let s = skew(a);
-    Rotation3::from_matrix_unchecked(
-        Matrix3::identity() + (s + s * s) * (2.0 / (1.0 + a.norm_squared())),
-    )
+    let share = 2.0 / (1.0 + a.norm_squared());
+    // 1 + share ([a]× + [a]×²), entry by entry.
+    let b = a * share;
+    let (xx, yy, zz) = (a.x * b.x, a.y * b.y, a.z * b.z);
+    let (xy, xz, yz) = (a.x * b.y, a.x * b.z, a.y * b.z);
+    Rotation3::from_matrix_unchecked(Matrix3::new(
+        1.0 - (yy + zz),
+        xy - b.z,
+        xz + b.y, //
+        xy + b.z,
+        1.0 - (xx + zz),
+        yz - b.x, //
+        xz - b.y,
+        yz + b.x,
+        1.0 - (xx + yy),
+    ))
 }
 
 /// Returns `Rz(yaw) Ry(pitch) Rx(roll)`, angles in radians.

@@ -97,7 +97,7 @@ fn image_normaliser(rays: &[Ray]) -> Matrix3<f64> {
 }
 
 fn object_normaliser(markers: &[Point3<f64>]) -> Matrix4<f64> {
-    let centre = mean(markers.iter());
+    let centre = mean(markers, |marker| marker);
     let spread = markers.iter().map(|p| (p - centre).norm()).sum::<f64>() / markers.len() as f64;
     let s = 3.0_f64.sqrt() / spread.max(f64::MIN_POSITIVE);
     Matrix4::new(

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 
 use crate::estimation::collinearity::CollinearityCost;
+use crate::estimation::four::Plain;
 use crate::estimation::newton::{self, Minimum};
 
 /// Rotations of the icosahedral group; none is farther than 44.5° from the nearest of them.
@@ -35,7 +36,9 @@ pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
     for (index, rotation) in ICOSAHEDRAL_GROUP.iter().enumerate() {
         // A start behind the camera still descends to the front now and then, but rarely.
         if cost.centre_in_camera(rotation).z > 0.0 {
-            insert(&mut starts, (cost.value(rotation), index), |a, b| a.0 < b.0);
+            insert(&mut starts, (cost.value(Plain, rotation), index), |a, b| {
+                a.0 < b.0
+            });
         }
     }
     let mut found = Minima {

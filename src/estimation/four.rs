@@ -1,0 +1,293 @@
+//! Four numbers at once, in the widest registers that the processor turns out to have.
+//!
+//! [`vectorised`] asks the processor and runs a [`Kernel`] with AVX2 and fused multiply-add, or with
+//! plain arrays, which compilers turn into SSE2 or Neon. The two differ by rounding: a fused product
+//! is rounded once less.
+
+use std::ops::{Add, Div, Mul, Sub};
+use std::sync::LazyLock;
+
+/// How many.
+pub(crate) const LANES: usize = 4;
+/// Four numbers in memory.
+pub(crate) type Lane = [f64; LANES];
+
+/// What sums over points are made of: one number, or four of them.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Returns `self + a b`.
+    fn plus(self, a: Self, b: Self) -> Self;
+    /// Returns `self − a b`.
+    fn minus(self, a: Self, b: Self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn plus(self, a: Self, b: Self) -> Self {
+        self + a * b
+    }
+
+    #[inline(always)]
+    fn minus(self, a: Self, b: Self) -> Self {
+        self - a * b
+    }
+}
+
+/// How four numbers are computed with.
+pub(crate) trait Arithmetic: Copy {
+    type Register: Copy;
+    fn load(self, lane: Lane) -> Self::Register;
+    fn store(self, a: Self::Register) -> Lane;
+    fn add(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn sub(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn mul(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    fn div(self, a: Self::Register, b: Self::Register) -> Self::Register;
+    /// `a b + c`
+    fn mul_add(self, a: Self::Register, b: Self::Register, c: Self::Register) -> Self::Register;
+    /// `c − a b`
+    fn negate_mul_add(
+        self,
+        a: Self::Register,
+        b: Self::Register,
+        c: Self::Register,
+    ) -> Self::Register;
+}
+
+/// Four numbers with the way to compute with them, which takes no room.
+#[derive(Clone, Copy)]
+pub(crate) struct Four<A: Arithmetic> {
+    arithmetic: A,
+    register: A::Register,
+}
+
+impl<A: Arithmetic> Four<A> {
+    #[inline(always)]
+    pub(crate) fn new(arithmetic: A, lane: Lane) -> Self {
+        Self {
+            arithmetic,
+            register: arithmetic.load(lane),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn splat(arithmetic: A, value: f64) -> Self {
+        Self::new(arithmetic, [value; LANES])
+    }
+
+    #[inline(always)]
+    pub(crate) fn lane(self) -> Lane {
+        self.arithmetic.store(self.register)
+    }
+
+    /// Returns the sum of the four.
+    #[inline(always)]
+    pub(crate) fn total(self) -> f64 {
+        let [a, b, c, d] = self.lane();
+        (a + c) + (b + d)
+    }
+
+    #[inline(always)]
+    fn with(self, register: A::Register) -> Self {
+        Self { register, ..self }
+    }
+}
+
+impl<A: Arithmetic> Add for Four<A> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(self.arithmetic.add(self.register, other.register))
+    }
+}
+
+impl<A: Arithmetic> Sub for Four<A> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(self.arithmetic.sub(self.register, other.register))
+    }
+}
+
+impl<A: Arithmetic> Mul for Four<A> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(self.arithmetic.mul(self.register, other.register))
+    }
+}
+
+impl<A: Arithmetic> Div for Four<A> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.with(self.arithmetic.div(self.register, other.register))
+    }
+}
+
+impl<A: Arithmetic> Number for Four<A> {
+    #[inline(always)]
+    fn plus(self, a: Self, b: Self) -> Self {
+        self.with(
+            self.arithmetic
+                .mul_add(a.register, b.register, self.register),
+        )
+    }
+
+    #[inline(always)]
+    fn minus(self, a: Self, b: Self) -> Self {
+        self.with(
+            self.arithmetic
+                .negate_mul_add(a.register, b.register, self.register),
+        )
+    }
+}
+
+/// Returns the sums over the lanes of each.
+#[inline(always)]
+pub(crate) fn totals<A: Arithmetic, const N: usize>(fours: &[Four<A>; N]) -> [f64; N] {
+    let mut totals = [0.0; N];
+    for (total, four) in totals.iter_mut().zip(fours) {
+        *total = four.total();
+    }
+    totals
+}
+
+/// Tells the compiler to keep sums in memory from one block to the next: more than sixteen registers hold
+/// are otherwise moved about twice a block. It costs no instruction, and changes no value.
+#[inline(always)]
+pub(crate) fn keep_in_memory<T>(sums: &mut T) {
+    std::hint::black_box(sums);
+}
+
+/// Work that can be done in any arithmetic. What it calls must be `inline(always)` down to the sums,
+/// or it is compiled for the oldest processor.
+pub(crate) trait Kernel {
+    type Output;
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output;
+}
+
+/// Runs a kernel in the best arithmetic there is.
+#[inline(always)]
+pub(crate) fn vectorised<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = *x86::AVX2 {
+        return avx2.vectorize(
+            #[inline(always)]
+            || kernel.run(avx2),
+        );
+    }
+    kernel.run(Plain)
+}
+
+/// Arrays and loops of fixed length.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain;
+
+#[inline(always)]
+fn zip(a: Lane, b: Lane, f: impl Fn(f64, f64) -> f64) -> Lane {
+    let mut out = [0.0; LANES];
+    for i in 0..LANES {
+        out[i] = f(a[i], b[i]);
+    }
+    out
+}
+
+impl Arithmetic for Plain {
+    type Register = Lane;
+
+    #[inline(always)]
+    fn load(self, lane: Lane) -> Lane {
+        lane
+    }
+
+    #[inline(always)]
+    fn store(self, a: Lane) -> Lane {
+        a
+    }
+
+    #[inline(always)]
+    fn add(self, a: Lane, b: Lane) -> Lane {
+        zip(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Lane, b: Lane) -> Lane {
+        zip(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Lane, b: Lane) -> Lane {
+        zip(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: Lane, b: Lane) -> Lane {
+        zip(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Lane, b: Lane, c: Lane) -> Lane {
+        self.add(c, self.mul(a, b))
+    }
+
+    #[inline(always)]
+    fn negate_mul_add(self, a: Lane, b: Lane, c: Lane) -> Lane {
+        self.sub(c, self.mul(a, b))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use pulp::x86::V3;
+    use pulp::{Simd, cast, f64x4};
+
+    use super::{Arithmetic, Lane, LazyLock};
+
+    /// AVX2 with fused multiply-add, where the processor has it; asked once.
+    pub(super) static AVX2: LazyLock<Option<V3>> = LazyLock::new(V3::try_new);
+
+    impl Arithmetic for V3 {
+        type Register = f64x4;
+
+        #[inline(always)]
+        fn load(self, lane: Lane) -> f64x4 {
+            cast(lane)
+        }
+
+        #[inline(always)]
+        fn store(self, a: f64x4) -> Lane {
+            cast(a)
+        }
+
+        #[inline(always)]
+        fn add(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.add_f64s(a, b)
+        }
+
+        #[inline(always)]
+        fn sub(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.sub_f64s(a, b)
+        }
+
+        #[inline(always)]
+        fn mul(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.mul_f64s(a, b)
+        }
+
+        #[inline(always)]
+        fn div(self, a: f64x4, b: f64x4) -> f64x4 {
+            self.div_f64s(a, b)
+        }
+
+        #[inline(always)]
+        fn mul_add(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
+            self.mul_add_e_f64s(a, b, c)
+        }
+
+        #[inline(always)]
+        fn negate_mul_add(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
+            self.negate_mul_add_e_f64s(a, b, c)
+        }
+    }
+}
