@@ -8,6 +8,7 @@
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 
 use super::environment::{DiscoveryRange, Environment};
+use super::rtps::{self, Data, GuidBytes, Packet};
 
 /// How many participants of this host are told by unicast.
 const LOCAL_PARTICIPANTS: u16 = 120;
@@ -17,7 +18,7 @@ const DISCOVERY_GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// All that must be known before the participant is gone to announce that it is gone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Farewell {
-    participant_guid: [u8; 16],
+    participant_guid: GuidBytes,
     domain_id: u16,
     range: DiscoveryRange,
 }
@@ -25,7 +26,7 @@ pub struct Farewell {
 impl Farewell {
     /// Returns the farewell of the participant with this GUID.
     #[must_use]
-    pub fn new(participant_guid: [u8; 16], environment: &Environment) -> Self {
+    pub fn new(participant_guid: GuidBytes, environment: &Environment) -> Self {
         Self {
             participant_guid,
             domain_id: environment.domain_id,
@@ -52,25 +53,18 @@ impl Farewell {
 
     /// Returns one RTPS message with the participant's dispose as SPDP carries it.
     fn packet(&self) -> Vec<u8> {
-        let mut inline_qos = vec![0x71, 0, 4, 0, 0, 0, 0, 3]; // PID_STATUS_INFO: disposed, unregistered
-        inline_qos.extend([0x70, 0, 16, 0]); // PID_KEY_HASH: the participant's GUID
-        inline_qos.extend(self.participant_guid);
-        inline_qos.extend([1, 0, 0, 0]); // PID_SENTINEL
-
-        let mut data = vec![0, 0, 16, 0]; // extra flags; octets to inline QoS
-        data.extend([0, 1, 0, 0xc7]); // to the SPDP reader
-        data.extend([0, 1, 0, 0xc2]); // from the SPDP writer
-        data.extend([0, 0, 0, 0, 0xff, 0xff, 0xff, 0x7f]); // sequence number above all that were sent
-        data.extend(inline_qos);
-
-        let mut packet = b"RTPS".to_vec();
-        packet.extend([2, 4, 1, 0x12]); // protocol 2.4, RustDDS's vendor id
-        packet.extend(&self.participant_guid[..12]); // the prefix that all its entities share
-        packet.extend([0x15, 0x03]); // DATA: little endian, inline QoS, no payload
-        // The length is a constant of about 60: it always fits.
-        packet.extend(u16::try_from(data.len()).unwrap_or(u16::MAX).to_le_bytes());
-        packet.extend(data);
-        packet
+        Packet::from_participant(&self.participant_guid)
+            .data(&Data {
+                reader: [0, 1, 0, 0xc7],      // of SPDP
+                writer: [0, 1, 0, 0xc2],      // of SPDP
+                sequence_number: 0x7fff_ffff, // above all that were sent
+                inline_qos: &[
+                    (rtps::STATUS_INFO, &[0, 0, 0, 3]), // disposed, unregistered
+                    (rtps::KEY_HASH, &self.participant_guid),
+                ],
+                payload: None,
+            })
+            .into_bytes()
     }
 }
 

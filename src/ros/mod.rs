@@ -5,6 +5,7 @@
 //! parameter_file, start_values       parameters at the start: defaults, files, arguments
 //! parameters                         parameters while the node runs, behind its services
 //! participant, leave                 into the graph, and out of it
+//! service, rtps                      services, and what of the wire protocol is written here
 //! messages, convert                  the wire <-> plain types
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
@@ -27,4 +28,6 @@ pub mod once;
 pub mod parameter_file;
 pub mod parameters;
 pub mod participant;
+pub mod rtps;
+pub mod service;
 pub mod start_values;

@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use futures::future::{Either, select};
 use futures::pin_mut;
-use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};
+use ros2_client::dds::rustdds::{DomainParticipant, DomainParticipantBuilder, RTPSEntity};
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::{Context, CreateError, CreateResult, MessageTypeName, Node, NodeCreateError};
 pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
@@ -197,6 +197,12 @@ impl RosNode {
                 topic: name.to_string(),
                 source,
             })
+    }
+
+    /// The client library's node, and the participant that it is part of, for endpoints of other kinds.
+    pub(super) fn parts(&mut self) -> (&mut Node, DomainParticipant) {
+        let participant = self.context.domain_participant();
+        (&mut self.node, participant)
     }
 
     /// The client library's node, for waits, counts and logging.

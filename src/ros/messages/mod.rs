@@ -7,9 +7,11 @@
 use serde::{Deserialize, Serialize};
 
 mod estimator_status;
+mod parameters;
 mod standard;
 
 pub use estimator_status::EstimatorStatus;
+pub use parameters::*;
 pub use standard::*;
 
 /// A message type's place in the ROS type system: `package/msg/name`.
@@ -57,6 +59,8 @@ ros_message!(
     "sensor_msgs" / CameraInfo,
     "tf2_msgs" / TFMessage,
     "diagnostic_msgs" / DiagnosticArray,
+    "rcl_interfaces" / ParameterEvent,
+    "rosgraph_msgs" / Clock,
     "tanker_pose" / FeaturePointArray,
     "tanker_pose" / EstimatorStatus,
 );

@@ -1,0 +1,285 @@
+//! Services whose replies arrive, however long they are.
+//!
+//! A reply carries the identity of its request as inline QoS. `RustDDS` splits a sample that does not fit
+//! the path's MTU, about 1400 bytes, and writes inline QoS into the pieces with one byte too many: no
+//! other implementation can read them, and the client waits forever. A long reply is therefore sent here
+//! as one sample in one UDP datagram, which the network splits and joins below RTPS. A short placeholder,
+//! meant for nobody, takes its place in the writer's sequence, so that the writer's own bookkeeping holds.
+//!
+//! What that costs: a long reply is not repeated when it is lost on the way.
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use futures::{StreamExt, pin_mut};
+use ros2_client::dds::rustdds::bytes::Bytes;
+use ros2_client::dds::rustdds::dds::WriteError;
+use ros2_client::dds::rustdds::no_key::{DataWriter, SerializerAdapter};
+use ros2_client::dds::rustdds::{
+    DomainParticipant, QosPolicies, RTPSEntity, RepresentationIdentifier, SampleIdentity,
+    SequenceNumber, Timestamp, TopicKind, WriteOptionsBuilder, serialization,
+};
+use ros2_client::qos::WhenFull;
+use ros2_client::{Gid, MessageInfo, RmwRequestId, Subscription};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::once::SaidOnce;
+use super::participant::{EndpointError, QosProfile, RosNode, reliable};
+use super::rtps::{self, Data, Packet};
+
+/// Longest reply that is left to `RustDDS`, bytes: below the least that it sends in one piece.
+const SHORT_BYTES: usize = 1200;
+/// Longest reply at all, bytes: what UDP carries, less the headers.
+const LONGEST_BYTES: usize = 65_000;
+/// How long a reply may wait for a client that does not acknowledge.
+const PATIENCE: Duration = Duration::from_millis(100);
+/// As `rmw_qos_profile_services_default` has it.
+const SERVICE: QosProfile = reliable(10).reliability_reliable(WhenFull::Wait(PATIENCE));
+
+/// CDR in little endian, before the sample itself.
+const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
+
+/// One service: its requests come in here, and its replies go out.
+pub struct Service<Request> {
+    name: String,
+    requests: Subscription<Request>,
+    replies: Replies,
+    bad_requests: SaidOnce<()>,
+}
+
+impl<Request: DeserializeOwned + 'static> Service<Request> {
+    /// Returns the service of this absolute name and type, open to clients.
+    ///
+    /// # Errors
+    /// [`EndpointError::Create`] when the middleware refuses.
+    pub fn open(
+        ros: &mut RosNode,
+        name: &str,
+        (package, service_type): (&str, &str),
+    ) -> Result<Self, EndpointError> {
+        let refused = |source| EndpointError::Create {
+            topic: name.to_owned(),
+            source,
+        };
+        let (node, participant) = ros.parts();
+        let qos = QosPolicies::from(&SERVICE);
+        let topic = |prefix: &str, part: &str, suffix: &str| {
+            participant
+                .create_topic(
+                    format!("{prefix}{name}{suffix}"),
+                    format!("{package}::srv::dds_::{service_type}_{part}_"),
+                    &qos,
+                    TopicKind::NoKey,
+                )
+                .map_err(|source| refused(source.into()))
+        };
+        let reply_topic = topic("rr", "Response", "Reply")?;
+        let writer = participant
+            .create_publisher(&qos)
+            .and_then(|publisher| {
+                publisher.create_datawriter_no_key(&reply_topic, Some(qos.clone()))
+            })
+            .map_err(|source| refused(source.into()))?;
+        // Requests last: what arrives can be answered.
+        let requests = node
+            .create_subscription(&topic("rq", "Request", "Request")?, None)
+            .map_err(refused)?;
+        Ok(Self {
+            name: name.to_owned(),
+            requests,
+            replies: Replies {
+                writer,
+                topic: format!("rr{name}Reply"),
+                participant,
+                next_sequence_number: 1,
+            },
+            bad_requests: SaidOnce::default(),
+        })
+    }
+
+    /// Answers every request, for ever.
+    pub async fn serve<Response: Serialize + Default>(
+        self,
+        mut answer: impl FnMut(Request) -> Response,
+    ) {
+        let Self {
+            name,
+            requests,
+            mut replies,
+            mut bad_requests,
+        } = self;
+        let requests = requests.async_stream();
+        pin_mut!(requests);
+        loop {
+            match requests.select_next_some().await {
+                Ok((request, info)) => {
+                    let response = answer(request);
+                    if let Err(error) = replies.send(identity(&info), &response) {
+                        log::warn!("service {name}: {error}");
+                    }
+                }
+                Err(error) => {
+                    if bad_requests.fault((), Instant::now()) {
+                        log::warn!("service {name}: cannot decode a request: {error}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Returns what a reply says it answers. Fast DDS names the client's reader, and leaves the number of the
+/// request to the sample itself.
+fn identity(info: &MessageInfo) -> RmwRequestId {
+    let own = RmwRequestId {
+        writer_gid: info.publisher_gid(),
+        sequence_number: info.sequence_number(),
+    };
+    match info.related_request_id() {
+        None => own,
+        Some(related) if related.sequence_number == i64::from(SequenceNumber::UNKNOWN) => {
+            RmwRequestId {
+                sequence_number: own.sequence_number,
+                ..related
+            }
+        }
+        Some(related) => related,
+    }
+}
+
+/// Why a reply was not sent as it is.
+#[derive(Debug, thiserror::Error)]
+enum ReplyError {
+    #[error("a reply cannot be encoded: {0}")]
+    Encode(String),
+    #[error(
+        "a reply of {length} bytes is too long, at most {LONGEST_BYTES} can be sent: an empty one was; \
+         ask for fewer parameters at a time"
+    )]
+    TooLong { length: usize },
+    #[error("a reply was not accepted by the middleware: {0}")]
+    Write(String),
+    #[error("a reply of {length} bytes was not sent: {reason}")]
+    Datagram { length: usize, reason: String },
+}
+
+struct Replies {
+    writer: DataWriter<Vec<u8>, Encoded>,
+    topic: String,
+    participant: DomainParticipant,
+    next_sequence_number: i64,
+}
+
+impl Replies {
+    fn send<Response: Serialize + Default>(
+        &mut self,
+        request: RmwRequestId,
+        response: &Response,
+    ) -> Result<(), ReplyError> {
+        let payload = encode(response)?;
+        let length = payload.len();
+        if length <= SHORT_BYTES {
+            return self.write(request, payload);
+        }
+        let nothing = encode(&Response::default())?;
+        if length > LONGEST_BYTES {
+            self.write(request, nothing)?;
+            return Err(ReplyError::TooLong { length });
+        }
+        let sent = self.send_datagrams(request, &payload);
+        // Meant for nobody: no client has this identity.
+        self.write(RmwRequestId::default(), nothing)?;
+        sent.map_err(|reason| ReplyError::Datagram { length, reason })
+    }
+
+    fn write(&mut self, request: RmwRequestId, payload: Vec<u8>) -> Result<(), ReplyError> {
+        let options = WriteOptionsBuilder::new()
+            .source_timestamp(Timestamp::now())
+            .related_sample_identity(SampleIdentity::from(request))
+            .build();
+        let written = self
+            .writer
+            .write_with_options(payload, options)
+            .map_err(|error: WriteError<_>| ReplyError::Write(error.forget_data().to_string()))?;
+        self.next_sequence_number = i64::from(written.sequence_number) + 1;
+        Ok(())
+    }
+
+    /// Sends the reply to all readers that the client's participant has on the topic: those that did not
+    /// ask know by the identity that it is not for them.
+    fn send_datagrams(&self, request: RmwRequestId, payload: &[u8]) -> Result<(), String> {
+        let client = request.writer_gid.to_bytes16();
+        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).map_err(|e| e.to_string())?;
+        let mut sent = false;
+        let mut failure = "the client is not in the graph, or has no IPv4 address".to_owned();
+        for reader in self.participant.discovered_readers() {
+            let guid = reader.reader_proxy.remote_reader_guid.to_bytes();
+            let topic = reader.subscription_topic_data.topic_name();
+            if guid[..12] != client[..12] || *topic != self.topic {
+                continue;
+            }
+            let packet = self.packet(request, Gid::from(guid), payload);
+            for locator in reader.reader_proxy.unicast_locator_list {
+                let address = SocketAddr::from(locator);
+                if !locator.is_udp() || !address.is_ipv4() {
+                    continue;
+                }
+                match socket.send_to(&packet, address) {
+                    Ok(_) => sent = true,
+                    Err(error) => failure = format!("{address}: {error}"),
+                }
+            }
+        }
+        if sent { Ok(()) } else { Err(failure) }
+    }
+
+    fn packet(&self, request: RmwRequestId, reader: Gid, payload: &[u8]) -> Vec<u8> {
+        let (writer, reader) = (self.writer.guid().to_bytes(), reader.to_bytes16());
+        let mut identity = request.writer_gid.to_bytes16().to_vec();
+        identity.extend(rtps::sequence_number(request.sequence_number));
+        let now = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap_or_default();
+        let entity = |guid: [u8; 16]| [guid[12], guid[13], guid[14], guid[15]];
+        Packet::from_participant(&writer)
+            .to_participant(&reader)
+            .written_at(
+                u32::try_from(now.as_secs()).unwrap_or(u32::MAX),
+                now.subsec_nanos(),
+            )
+            .data(&Data {
+                reader: entity(reader),
+                writer: entity(writer),
+                sequence_number: self.next_sequence_number,
+                inline_qos: &[
+                    (rtps::RELATED_SAMPLE_IDENTITY, &identity),
+                    (rtps::RELATED_SAMPLE_IDENTITY_OF_OLD, &identity),
+                ],
+                payload: Some(&[&ENCAPSULATION, payload].concat()),
+            })
+            .into_bytes()
+    }
+}
+
+fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, ReplyError> {
+    let mut bytes = Vec::new();
+    serialization::to_writer_with_rep_id(&mut bytes, value, Encoded::output_encoding())
+        .map_err(|error| ReplyError::Encode(error.to_string()))?;
+    Ok(bytes)
+}
+
+/// Samples that are CDR already.
+struct Encoded;
+
+impl SerializerAdapter<Vec<u8>> for Encoded {
+    type Error = std::convert::Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(value: &Vec<u8>) -> Result<Bytes, Self::Error> {
+        Ok(Bytes::copy_from_slice(value))
+    }
+}
