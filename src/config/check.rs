@@ -1,6 +1,6 @@
 //! A raw value against its parameter's line in the table.
 
-use super::table::{Kind, ParameterSpec, TABLE};
+use super::table::{FRAME_ID, Kind, ParameterSpec, TABLE, TEXT};
 use super::{ParameterError, ParameterValue};
 
 /// Returns the table's own name, and the value in the type that the table gives it.
@@ -46,15 +46,11 @@ fn check(spec: &ParameterSpec, value: ParameterValue) -> Result<ParameterValue, 
             }
         }
         (Kind::Text { .. }, String(value)) => {
-            require(name, value, "not be empty", |text| !text.trim().is_empty())
+            require(name, value, TEXT, |text| !text.trim().is_empty())
         }
-        (Kind::FrameId { .. }, String(value)) => {
-            let requirement =
-                "be a tf2 frame: not empty, without white space, not beginning with a slash";
-            require(name, value, requirement, |text| {
-                !text.is_empty() && !text.starts_with('/') && !text.contains(char::is_whitespace)
-            })
-        }
+        (Kind::FrameId { .. }, String(value)) => require(name, value, FRAME_ID, |text| {
+            !text.is_empty() && !text.starts_with('/') && !text.contains(char::is_whitespace)
+        }),
         (kind, value) => Err(ParameterError::WrongType {
             name,
             expected: type_name(kind),

@@ -17,6 +17,8 @@ pub struct Configuration {
     pub tanker_frame_id: String,
     /// Whether to publish to /tf.
     pub publish_tf: bool,
+    /// Whether time comes from /clock.
+    pub use_sim_time: bool,
 }
 
 impl From<&Parameters> for Configuration {
@@ -31,6 +33,7 @@ impl From<&Parameters> for Configuration {
             marker_map: parameters.text("marker_map").to_owned(),
             tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
             publish_tf: parameters.bool("publish_tf"),
+            use_sim_time: parameters.bool("use_sim_time"),
         }
     }
 }
@@ -152,6 +155,7 @@ mod tests {
             ("marker_map", String("fin6".into())),
             ("tanker_frame_id", String("kc46".into())),
             ("publish_tf", Bool(true)),
+            ("use_sim_time", Bool(true)),
             ("pixel_sigma_px", Double(0.25)),
             ("rectified", Bool(true)),
             ("initialisation", String("global".into())),
@@ -166,7 +170,7 @@ mod tests {
             (found.marker_map.as_str(), found.tanker_frame_id.as_str()),
             ("fin6", "kc46")
         );
-        assert!(found.publish_tf && found.settings.rectified);
+        assert!(found.publish_tf && found.use_sim_time && found.settings.rectified);
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
         assert_eq!(estimator.initialisation, Initialisation::Global);
         assert_eq!(estimator.refinement, Refinement::None);

@@ -47,6 +47,27 @@ pub enum Kind {
     },
 }
 
+/// What a frame id has to be.
+pub(super) const FRAME_ID: &str =
+    "be a tf2 frame: not empty, without white space, not beginning with a slash";
+/// What any other text has to be.
+pub(super) const TEXT: &str = "not be empty";
+
+impl Kind {
+    /// Returns what is allowed, for people.
+    #[must_use]
+    pub fn allowed(&self) -> String {
+        match self {
+            Self::Bool { .. } => "a bool".to_owned(),
+            Self::Integer { min, max, .. } => format!("an integer from {min} to {max}"),
+            Self::Double { min, max, .. } => format!("a number from {min:?} to {max:?}"),
+            Self::Choice { allowed, .. } => format!("one of {}", allowed.join(", ")),
+            Self::Text { .. } => format!("text that must {TEXT}"),
+            Self::FrameId { .. } => format!("text that must {FRAME_ID}"),
+        }
+    }
+}
+
 /// One parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterSpec {
@@ -218,7 +239,7 @@ pub const TABLE: &[ParameterSpec] = &[
         name: "use_sim_time",
         kind: Kind::Bool { default: false },
         read_only: false,
-        description: "take the time of diagnostics and log messages from /clock: accepted, not done yet; \
+        description: "take the time of diagnostics and parameter events from /clock; \
                       stamps of poses are those of the detections either way, never read from a clock",
     },
 ];

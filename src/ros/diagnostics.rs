@@ -1,7 +1,7 @@
 //! The node's health once a second, for `rqt_robot_monitor` and the like (REP-107).
 
 use std::fmt;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use crate::pipeline::OutcomeCode;
 
@@ -81,6 +81,8 @@ impl Tally {
 /// What the report needs beside the counts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Situation<'a> {
+    /// The node's time.
+    pub now: Time,
     /// The node's name without its namespace.
     pub node: &'a str,
     /// Name of the marker map.
@@ -134,7 +136,7 @@ impl Reporter {
         self.previous = tally.clone();
         DiagnosticArray {
             header: Header {
-                stamp: now(),
+                stamp: situation.now,
                 ..Header::default()
             },
             status: vec![status],
@@ -223,16 +225,6 @@ fn values(
         .collect()
 }
 
-fn now() -> Time {
-    let since_epoch = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    Time {
-        sec: i32::try_from(since_epoch.as_secs()).unwrap_or(i32::MAX),
-        nanosec: since_epoch.subsec_nanos(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -241,6 +233,7 @@ mod tests {
 
     fn situation(camera: &CameraState) -> Situation<'_> {
         Situation {
+            now: Time { sec: 7, nanosec: 8 },
             node: "tanker_pose",
             marker_map: "paper",
             camera,

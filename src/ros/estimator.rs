@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use ros2_client::{Publisher, WriteError};
 
+use super::clock::NodeClock;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::messages::{
@@ -77,6 +78,7 @@ pub struct Outputs {
 pub struct Estimator {
     pipeline: Pipeline,
     outputs: Outputs,
+    clock: NodeClock,
     node: String,
     marker_map: String,
     camera: CameraState,
@@ -94,12 +96,19 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Returns an estimator that has not seen a message yet, for the node of this name.
+    /// Returns an estimator that has not seen a message yet, for the node and marker map of
+    /// these names.
     #[must_use]
-    pub fn new(pipeline: Pipeline, outputs: Outputs, node: &str, marker_map: &str) -> Self {
+    pub fn new(
+        pipeline: Pipeline,
+        outputs: Outputs,
+        clock: NodeClock,
+        (node, marker_map): (&str, &str),
+    ) -> Self {
         Self {
             pipeline,
             outputs,
+            clock,
             node: node.to_owned(),
             marker_map: marker_map.to_owned(),
             camera: CameraState::Missing,
@@ -166,6 +175,7 @@ impl Estimator {
     /// Publishes the diagnostics; `publishers`: of `feature_points`, in the graph.
     pub fn on_second(&mut self, publishers: usize, now: Instant) {
         let situation = Situation {
+            now: self.clock.now(),
             node: &self.node,
             marker_map: &self.marker_map,
             camera: &self.camera,

@@ -3,7 +3,8 @@
 //! ```text
 //! arguments, environment, names      what the command line and the variables ask for, checked
 //! parameter_file, start_values       parameters at the start: defaults, files, arguments
-//! parameters                         parameters while the node runs, behind its services
+//! parameters, qos_overrides          parameters while the node runs, behind its services
+//! clock                              the node's time, the system's or a simulation's
 //! participant, leave                 into the graph, and out of it
 //! service, rtps                      services, and what of the wire protocol is written here
 //! messages, convert                  the wire <-> plain types
@@ -15,6 +16,7 @@
 //! Tools that talk ROS start from [`participant::RosNode::open`].
 
 pub mod arguments;
+pub mod clock;
 pub mod convert;
 pub mod diagnostics;
 pub mod environment;
@@ -28,6 +30,7 @@ pub mod once;
 pub mod parameter_file;
 pub mod parameters;
 pub mod participant;
+pub mod qos_overrides;
 pub mod rtps;
 pub mod service;
 pub mod start_values;

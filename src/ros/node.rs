@@ -9,13 +9,15 @@ use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 use ros2_client::{NodeOptions, Subscription};
 
 use super::arguments::Arguments;
+use super::clock::{NodeClock, SimTime};
 use super::environment::Environment;
 use super::estimator::{Estimator, Output, Outputs};
 use super::logging;
 use super::messages::{CameraInfo, FeaturePointArray, Message};
 use super::names::{NamesError, NodeNames};
-use super::parameters::SharedParameters;
+use super::parameters::{ParameterServices, SharedParameters};
 use super::participant::{EndpointError, OpenError, QosProfile, RosNode, reliable, sensor_data};
+use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::start_values::{StartParameterError, start_values};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
@@ -101,29 +103,61 @@ pub fn run_until(
     stop: impl Future<Output = ()>,
 ) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
-    let start = start_values(arguments, &names.fully_qualified())?;
+    let qos = QosOverrides::new(endpoints(&names)?);
+    let start = start_values(arguments, &names.fully_qualified(), qos)?;
     let configuration = Configuration::from(&start.parameters);
     let map = Arc::new(marker_map(&configuration.marker_map)?);
 
-    let (parameters, changes) = SharedParameters::new(start.parameters);
-    let options = parameters.declare(NodeOptions::new());
+    let options = NodeOptions::new().start_parameter_services(false);
     let mut ros = RosNode::open(NODE_NAME, arguments, environment, options)?;
     logging::start_rosout(ros.node().logging_handle());
     for warning in environment.warnings.iter().chain(&start.warnings) {
         log::warn!("{warning}");
     }
-    let served = Service::open(&mut ros, &configuration, &map).map(|mut service| {
-        introduce(&ros, environment, &map, configuration.publish_tf);
-        warn_of_too_small_map(&configuration, &map);
-        let update = || Configuration::from(&parameters.snapshot()).settings;
-        smol::block_on(service.serve(&ros, stop, changes, update));
-    });
+    ros.override_qos(start.qos.clone());
+    let (parameters, changes) = SharedParameters::new(start.parameters, &start.qos);
+    let clock = NodeClock::default();
+    let mut sim_time = SimTime::new(clock.clone());
+    let served = sim_time
+        .follow(&mut ros, configuration.use_sim_time)
+        .and_then(|()| Service::open(&mut ros, &configuration, &map, &clock))
+        .and_then(|service| {
+            // Parameters last: who finds the services finds the topics too.
+            Ok((
+                service,
+                ParameterServices::open(&mut ros, &parameters, &clock)?,
+            ))
+        })
+        .map(|(mut service, parameter_services)| {
+            introduce(&ros, environment, &map, configuration.publish_tf);
+            warn_of_too_small_map(&configuration, &map);
+            let update = || Configuration::from(&parameters.snapshot());
+            smol::block_on(service.serve(&mut ros, stop, changes, update, &mut sim_time));
+            parameter_services.close();
+        });
+    sim_time.close();
     if served.is_ok() {
         log::info!("leaving");
     }
     logging::stop_rosout();
     ros.close();
     Ok(served?)
+}
+
+/// Returns the node's topics, for `qos_overrides`.
+fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
+    let endpoint = |topic, role, qos| Ok(Endpoint::new(names.topic(topic)?, role, qos));
+    [
+        (FEATURE_POINTS, Role::Subscription, &INPUT),
+        (CAMERA_INFO, Role::Subscription, &INPUT),
+        (POSE, Role::Publisher, &OUTPUT),
+        (STATUS, Role::Publisher, &OUTPUT),
+        ("/tf", Role::Publisher, &TRANSFORMS),
+        ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
+    ]
+    .into_iter()
+    .map(|(topic, role, qos)| endpoint(topic, role, qos))
+    .collect()
 }
 
 /// Returns the shipped map of this name, or the one in the file at this path.
@@ -188,6 +222,7 @@ impl Service {
         ros: &mut RosNode,
         configuration: &Configuration,
         map: &Arc<MarkerMap>,
+        clock: &NodeClock,
     ) -> Result<Self, EndpointError> {
         let transform = if configuration.publish_tf {
             let child = configuration.tanker_frame_id.clone();
@@ -206,17 +241,23 @@ impl Service {
             // Inputs last: what arrives can be answered.
             camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
             feature_points: ros.subscription(FEATURE_POINTS, &INPUT)?,
-            estimator: Estimator::new(pipeline, outputs, ros.names().base_name(), map.name()),
+            estimator: Estimator::new(
+                pipeline,
+                outputs,
+                clock.clone(),
+                (ros.names().base_name(), map.name()),
+            ),
         })
     }
 
     /// Feeds the estimator until `stop` ends.
     async fn serve(
         &mut self,
-        ros: &RosNode,
+        ros: &mut RosNode,
         stop: impl Future<Output = ()>,
         changes: smol::channel::Receiver<()>,
-        update: impl Fn() -> crate::config::Settings,
+        update: impl Fn() -> Configuration,
+        sim_time: &mut SimTime,
     ) {
         let estimator = &mut self.estimator;
         let camera_infos = self.camera_info.async_stream();
@@ -229,7 +270,13 @@ impl Service {
             // frame counts for it.
             select_biased! {
                 () = stop => break,
-                () = changes.select_next_some() => estimator.on_settings(update()),
+                () = changes.select_next_some() => {
+                    let configuration = update();
+                    estimator.on_settings(configuration.settings);
+                    if let Err(error) = sim_time.follow(ros, configuration.use_sim_time) {
+                        log::error!("use_sim_time has no effect: {error}");
+                    }
+                },
                 sample = camera_infos.select_next_some() => match sample {
                     Ok((message, _)) => estimator.on_camera_info(&message),
                     Err(error) => estimator.on_undecodable(CAMERA_INFO, &error),

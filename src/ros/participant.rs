@@ -29,6 +29,7 @@ use super::environment::Environment;
 use super::leave::Farewell;
 use super::messages::Message;
 use super::names::{NamesError, NodeNames};
+use super::qos_overrides::{QosOverrides, Role};
 
 /// How long the background task may take to end before it is left behind.
 const SPIN_GRACE: Duration = Duration::from_millis(300);
@@ -122,6 +123,7 @@ pub struct RosNode {
     spin: smol::Task<CreateResult<()>>,
     context: Context,
     names: NodeNames,
+    qos_overrides: QosOverrides,
     farewell: Farewell,
 }
 
@@ -157,8 +159,14 @@ impl RosNode {
             spin,
             context,
             names,
+            qos_overrides: QosOverrides::default(),
             farewell,
         })
+    }
+
+    /// Opens publishers and subscriptions from now on with this quality of service, where it knows their topic.
+    pub fn override_qos(&mut self, overrides: QosOverrides) {
+        self.qos_overrides = overrides;
     }
 
     /// Returns a publisher on `topic`, its name expanded and remapped.
@@ -171,8 +179,9 @@ impl RosNode {
         qos: &QosProfile,
     ) -> Result<Publisher<M>, EndpointError> {
         let name = self.names.client_topic(topic)?;
+        let qos = self.qos(topic, Role::Publisher, qos)?;
         self.node
-            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), qos)
+            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| self.node.create_publisher(&topic, None))
             .map_err(|source| EndpointError::Create {
                 topic: name.to_string(),
@@ -190,13 +199,19 @@ impl RosNode {
         qos: &QosProfile,
     ) -> Result<Subscription<M>, EndpointError> {
         let name = self.names.client_topic(topic)?;
+        let qos = self.qos(topic, Role::Subscription, qos)?;
         self.node
-            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), qos)
+            .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| self.node.create_subscription(&topic, None))
             .map_err(|source| EndpointError::Create {
                 topic: name.to_string(),
                 source,
             })
+    }
+
+    fn qos(&self, topic: &str, role: Role, default: &QosProfile) -> Result<QosProfile, NamesError> {
+        let topic = self.names.topic(topic)?;
+        Ok(self.qos_overrides.profile(&topic, role, default))
     }
 
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.

@@ -6,7 +6,9 @@ use ros2args::ParamAssignment;
 
 use super::arguments::Arguments;
 use super::parameter_file::{self, ParameterFileError};
+use super::qos_overrides::{self, QosOverrideError, QosOverrides};
 use crate::config::{ParameterError, ParameterValue, Parameters};
+use crate::text::clip;
 
 /// Why the parameters given at the start cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -23,11 +25,11 @@ pub enum StartParameterError {
         /// Where.
         line: u64,
         /// What is wrong.
-        source: ParameterError,
+        source: StartValueError,
     },
     /// A value of `-p`.
     #[error("argument -p: {0}")]
-    InArgument(ParameterError),
+    InArgument(StartValueError),
     /// A list, a map, or nothing where a value belongs.
     #[error("{place}: parameter {name:?} needs a bool, a number or text")]
     NoScalar {
@@ -38,35 +40,53 @@ pub enum StartParameterError {
     },
 }
 
+/// What is wrong with a value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StartValueError {
+    /// One of the table.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// One of a topic's quality of service.
+    #[error(transparent)]
+    Qos(#[from] QosOverrideError),
+}
+
 /// What [`start_values`] found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartValues {
     /// A value for every parameter.
     pub parameters: Parameters,
+    /// The topics' quality of service.
+    pub qos: QosOverrides,
     /// What is allowed, but perhaps not meant.
     pub warnings: Vec<String>,
 }
 
 /// Returns the parameters of the node with this absolute name: defaults, overridden by the files in
-/// their order, overridden by `-p`.
+/// their order, overridden by `-p`; and so with `qos`.
 ///
 /// # Errors
 /// [`StartParameterError`] names the parameter, and the file and line that it stands in.
-pub fn start_values(arguments: &Arguments, node: &str) -> Result<StartValues, StartParameterError> {
-    let mut parameters = Parameters::default();
-    let mut warnings = Vec::new();
+pub fn start_values(
+    arguments: &Arguments,
+    node: &str,
+    qos: QosOverrides,
+) -> Result<StartValues, StartParameterError> {
+    let mut found = StartValues {
+        parameters: Parameters::default(),
+        qos,
+        warnings: Vec::new(),
+    };
     for path in &arguments.parameter_files {
         let Some(section) = parameter_file::read(path, node)? else {
-            warnings.push(format!(
+            found.warnings.push(format!(
                 "parameter file {} has no section for {node}",
                 path.display()
             ));
             continue;
         };
-        for parameter in section
-            .into_iter()
-            .filter(|parameter| !is_foreign(&parameter.name))
-        {
+        for parameter in section {
             let line = parameter.line;
             let Some(value) = parameter.value else {
                 let place = format!("parameter file {}, line {line}", path.display());
@@ -75,39 +95,48 @@ pub fn start_values(arguments: &Arguments, node: &str) -> Result<StartValues, St
                     name: parameter.name,
                 });
             };
-            parameters.set(&parameter.name, value).map_err(|source| {
-                StartParameterError::InFile {
+            found
+                .set(&parameter.name, value)
+                .map_err(|source| StartParameterError::InFile {
                     path: path.clone(),
                     line,
                     source,
-                }
-            })?;
+                })?;
         }
     }
     let base_name = ros2args::extract_base_name(node);
     for assignment in &arguments.parameters {
         let applies = assignment.applies_to_node(base_name) || assignment.applies_to_node(node);
-        if !applies || is_foreign(&assignment.name) {
+        if !applies {
             continue;
         }
         let value = scalar(assignment).ok_or_else(|| StartParameterError::NoScalar {
             place: "argument -p".to_owned(),
             name: assignment.name.clone(),
         })?;
-        parameters
+        found
             .set(&assignment.name, value)
             .map_err(StartParameterError::InArgument)?;
     }
-    Ok(StartValues {
-        parameters,
-        warnings,
-    })
+    Ok(found)
 }
 
-/// ROS has parameters of its own for quality of service: launch files may carry them, and nothing
-/// here reads them.
-fn is_foreign(name: &str) -> bool {
-    name.starts_with("qos_overrides.")
+impl StartValues {
+    fn set(&mut self, name: &str, value: ParameterValue) -> Result<(), StartValueError> {
+        if !name.starts_with(qos_overrides::PREFIX) {
+            return Ok(self.parameters.set(name, value)?);
+        }
+        // Files that serve several nodes carry topics of others.
+        if !self.qos.set(name, &value)? {
+            let topics: Vec<&str> = self.qos.topics().collect();
+            self.warnings.push(format!(
+                "parameter {:?} is of no topic of this node: they are {}",
+                clip(name),
+                topics.join(", ")
+            ));
+        }
+        Ok(())
+    }
 }
 
 fn scalar(assignment: &ParamAssignment) -> Option<ParameterValue> {
@@ -127,6 +156,8 @@ fn scalar(assignment: &ParamAssignment) -> Option<ParameterValue> {
 mod tests {
     use std::path::Path;
 
+    use super::super::participant::reliable;
+    use super::super::qos_overrides::{Endpoint, Role};
     use super::*;
     use crate::config::TABLE;
 
@@ -176,7 +207,7 @@ mod tests {
             "-p",
             "pixel_sigma_px:=1",
         ]);
-        let found = start_values(&given, "/uav1/tanker_pose")
+        let found = start_values(&given, "/uav1/tanker_pose", QosOverrides::default())
             .expect("valid")
             .parameters;
         assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
@@ -188,16 +219,14 @@ mod tests {
     }
 
     #[test]
-    fn argument_for_another_node_and_qos_overrides_are_passed_over() {
+    fn argument_for_another_node_is_passed_over() {
         let given = arguments(&[
             "-p",
             "other:max_outliers:=2",
             "-p",
             "tanker_pose:min_points:=6",
-            "-p",
-            "qos_overrides./pose.publisher.depth:=1",
         ]);
-        let found = start_values(&given, "/tanker_pose")
+        let found = start_values(&given, "/tanker_pose", QosOverrides::default())
             .expect("valid")
             .parameters;
         assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
@@ -213,8 +242,40 @@ mod tests {
             ("pixel_sigma_px:=.nan", "pixel_sigma_px"),
             ("rectified:=~", "rectified"),
         ] {
-            let refused = start_values(&arguments(&["-p", argument]), "/n").expect_err(argument);
+            let given = arguments(&["-p", argument]);
+            let refused = start_values(&given, "/n", QosOverrides::default()).expect_err(argument);
             assert!(refused.to_string().contains(name), "{argument}: {refused}");
         }
+    }
+
+    #[test]
+    fn qos_of_own_topics_is_overridden_and_that_of_others_is_warned_of() {
+        let pose = Endpoint::new("/pose".into(), Role::Publisher, &reliable(50));
+        let qos = QosOverrides::new(vec![pose]);
+        let given = arguments(&[
+            "-p",
+            "qos_overrides./pose.publisher.depth:=1",
+            "-p",
+            "qos_overrides./image.publisher.depth:=2",
+        ]);
+        let found = start_values(&given, "/n", qos.clone()).expect("valid");
+        let default = reliable(50);
+        assert_eq!(
+            found.qos.profile("/pose", Role::Publisher, &default),
+            reliable(1)
+        );
+        assert_eq!(found.warnings.len(), 1);
+        assert!(
+            found.warnings[0].contains("/image"),
+            "{}",
+            found.warnings[0]
+        );
+
+        let given = arguments(&["-p", "qos_overrides./pose.publisher.depth:=none"]);
+        let refused = start_values(&given, "/n", qos).expect_err("a word is no depth");
+        assert!(
+            refused.to_string().contains("an integer from 1"),
+            "{refused}"
+        );
     }
 }

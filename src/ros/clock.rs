@@ -1,0 +1,152 @@
+//! The node's time: the system's, or a simulation's from `/clock`.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use futures::{StreamExt, pin_mut};
+use ros2_client::Subscription;
+
+use super::messages::{Clock, Time};
+use super::once::SaidOnce;
+use super::participant::{EndpointError, QosProfile, RosNode, sensor_data};
+
+/// Where simulators publish their time.
+const CLOCK: &str = "/clock";
+/// As rclcpp has it: only the latest time counts.
+const LATEST: QosProfile = sensor_data(1);
+
+/// Time as all of the node sees it.
+#[derive(Debug, Clone, Default)]
+pub struct NodeClock {
+    /// The simulated time while `use_sim_time` is set.
+    simulated: Arc<Mutex<Option<Time>>>,
+}
+
+impl NodeClock {
+    /// Returns the node's time; while it is simulated, zero until a first `/clock` has come, as in all of ROS.
+    #[must_use]
+    pub fn now(&self) -> Time {
+        self.lock().unwrap_or_else(system_time)
+    }
+
+    fn simulate(&self, on: bool) {
+        let mut simulated = self.lock();
+        if on != simulated.is_some() {
+            *simulated = on.then(Time::default);
+        }
+    }
+
+    fn set(&self, time: Time) {
+        // A sample that comes after simulation has been switched off is late.
+        if let Some(simulated) = self.lock().as_mut() {
+            *simulated = time;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Time>> {
+        // A time is replaced as a whole: a panic elsewhere cannot leave half of one behind.
+        self.simulated
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Listens to `/clock` while `use_sim_time` is set.
+///
+/// ros2-client has a subscription of its own to that topic, with a type that nobody publishes.
+pub struct SimTime {
+    clock: NodeClock,
+    listener: Option<smol::Task<()>>,
+}
+
+impl SimTime {
+    /// Returns the switch of this clock; off.
+    #[must_use]
+    pub const fn new(clock: NodeClock) -> Self {
+        Self {
+            clock,
+            listener: None,
+        }
+    }
+
+    /// Takes the time from `/clock` from now on, or no longer.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the middleware refuses the subscription.
+    pub fn follow(&mut self, ros: &mut RosNode, on: bool) -> Result<(), EndpointError> {
+        if on == self.listener.is_some() {
+            return Ok(());
+        }
+        if on {
+            let subscription = ros.subscription(CLOCK, &LATEST)?;
+            self.clock.simulate(true);
+            self.listener = Some(smol::spawn(listen(subscription, self.clock.clone())));
+            log::info!("time is simulated: it comes from {CLOCK}");
+        } else {
+            self.close();
+            log::info!("time is the system's");
+        }
+        Ok(())
+    }
+
+    /// Ends the subscription, which has to be gone before the node is.
+    pub fn close(&mut self) {
+        if let Some(listener) = self.listener.take() {
+            smol::block_on(listener.cancel());
+        }
+        self.clock.simulate(false);
+    }
+}
+
+async fn listen(subscription: Subscription<Clock>, clock: NodeClock) {
+    let mut bad_samples = SaidOnce::default();
+    let samples = subscription.async_stream();
+    pin_mut!(samples);
+    loop {
+        let fault = match samples.select_next_some().await {
+            Ok((Clock { clock: time }, _)) if time.nanosec < 1_000_000_000 => {
+                clock.set(time);
+                continue;
+            }
+            Ok((Clock { clock: time }, _)) => {
+                format!("nanosec must be below 1000000000, got {}", time.nanosec)
+            }
+            Err(error) => error.to_string(),
+        };
+        if bad_samples.fault((), Instant::now()) {
+            log::warn!("a time of {CLOCK} is not used: {fault}");
+        }
+    }
+}
+
+fn system_time() -> Time {
+    let since_epoch = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Time {
+        sec: i32::try_from(since_epoch.as_secs()).unwrap_or(i32::MAX),
+        nanosec: since_epoch.subsec_nanos(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simulated_time_is_zero_until_it_comes_and_holds_only_while_it_is_wanted() {
+        let clock = NodeClock::default();
+        let time = Time { sec: 7, nanosec: 8 };
+        clock.set(time);
+        assert!(clock.now().sec > 1_000_000_000, "the system's");
+
+        clock.simulate(true);
+        assert_eq!(clock.now(), Time::default());
+        clock.set(time);
+        clock.simulate(true);
+        assert_eq!(clock.now(), time, "wanted twice is wanted once");
+
+        clock.simulate(false);
+        assert!(clock.now().sec > 1_000_000_000);
+    }
+}

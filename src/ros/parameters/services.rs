@@ -1,0 +1,147 @@
+//! The six parameter services of a ROS node, and the events from which others hear of changes.
+//!
+//! ros2-client has such services too. They describe nothing, and long replies of theirs do not arrive: a
+//! node that opens these switches those off in its [`super::super::participant::NodeOptions`].
+
+use std::sync::Arc;
+
+use futures::future::join_all;
+use futures::{FutureExt, future::BoxFuture};
+use ros2_client::Publisher;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::SharedParameters;
+use crate::ros::clock::NodeClock;
+use crate::ros::messages::{
+    Assignments, ListRequest, Names, ParameterEvent, SetParametersResult, WireParameter,
+};
+use crate::ros::participant::{EndpointError, QosProfile, RosNode, reliable};
+use crate::ros::service::Service;
+
+const PACKAGE: &str = "rcl_interfaces";
+/// As `rmw_qos_profile_parameter_events` has it.
+const EVENTS: QosProfile = reliable(1000);
+
+/// The services, open and answering until they are closed.
+pub struct ParameterServices(smol::Task<()>);
+
+impl ParameterServices {
+    /// Opens the services of these parameters.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the middleware refuses.
+    pub fn open(
+        ros: &mut RosNode,
+        parameters: &SharedParameters,
+        clock: &NodeClock,
+    ) -> Result<Self, EndpointError> {
+        let events = Arc::new(Events {
+            publisher: ros.publisher("/parameter_events", &EVENTS)?,
+            clock: clock.clone(),
+            node: ros.names().fully_qualified(),
+        });
+        let shared = || parameters.clone();
+        let (list, get, types, describe) = (shared(), shared(), shared(), shared());
+        let (set, set_all, set_events, set_all_events) =
+            (shared(), shared(), Arc::clone(&events), events);
+        let services = [
+            service(
+                ros,
+                "list_parameters",
+                "ListParameters",
+                move |request: ListRequest| list.list(&request),
+            )?,
+            service(
+                ros,
+                "get_parameters",
+                "GetParameters",
+                move |Names { names }| get.get(&names),
+            )?,
+            service(
+                ros,
+                "get_parameter_types",
+                "GetParameterTypes",
+                move |Names { names }| types.types(&names),
+            )?,
+            service(
+                ros,
+                "describe_parameters",
+                "DescribeParameters",
+                move |Names { names }| describe.describe(&names),
+            )?,
+            service(
+                ros,
+                "set_parameters",
+                "SetParameters",
+                move |request: Assignments| {
+                    let set_one = |one| set_events.after(set.set(std::slice::from_ref(one)));
+                    request.parameters.iter().map(set_one).collect::<Vec<_>>()
+                },
+            )?,
+            service(
+                ros,
+                "set_parameters_atomically",
+                "SetParametersAtomically",
+                move |request: Assignments| set_all_events.after(set_all.set(&request.parameters)),
+            )?,
+        ];
+        Ok(Self(smol::spawn(join_all(services).map(drop))))
+    }
+
+    /// Ends the services, which have to be gone before the node is.
+    pub fn close(self) {
+        smol::block_on(self.0.cancel());
+    }
+}
+
+/// Returns the work of one service of the node.
+fn service<Request, Response>(
+    ros: &mut RosNode,
+    name: &str,
+    service_type: &str,
+    answer: impl FnMut(Request) -> Response + Send + 'static,
+) -> Result<BoxFuture<'static, ()>, EndpointError>
+where
+    Request: DeserializeOwned + Send + Sync + 'static,
+    Response: Serialize + Default + Send + Sync + 'static,
+{
+    let name = format!("{}/{name}", ros.names().fully_qualified());
+    let service = Service::open(ros, &name, (PACKAGE, service_type))?;
+    Ok(service.serve(answer).boxed())
+}
+
+/// Where others hear of changes.
+struct Events {
+    publisher: Publisher<ParameterEvent>,
+    clock: NodeClock,
+    node: String,
+}
+
+impl Events {
+    /// Returns the result to answer with, once the others have been told.
+    fn after(
+        &self,
+        outcome: Result<Vec<WireParameter>, SetParametersResult>,
+    ) -> SetParametersResult {
+        let changed_parameters = match outcome {
+            Ok(changed) => changed,
+            Err(refusal) => return refusal,
+        };
+        if !changed_parameters.is_empty() {
+            let event = ParameterEvent {
+                stamp: self.clock.now(),
+                node: self.node.clone(),
+                changed_parameters,
+                ..ParameterEvent::default()
+            };
+            if let Err(error) = self.publisher.publish(event) {
+                log::warn!("a change of parameters is not told on /parameter_events: {error}");
+            }
+        }
+        SetParametersResult {
+            successful: true,
+            reason: String::new(),
+        }
+    }
+}
