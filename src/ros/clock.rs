@@ -29,15 +29,18 @@ impl NodeClock {
         self.lock().unwrap_or_else(system_time)
     }
 
-    fn simulate(&self, on: bool) {
+    /// Begins or ends simulated time; false when that changes nothing.
+    fn simulate(&self, on: bool) -> bool {
         let mut simulated = self.lock();
-        if on != simulated.is_some() {
+        let changes = on != simulated.is_some();
+        if changes {
             *simulated = on.then(Time::default);
         }
+        changes
     }
 
+    /// Takes a simulated time, if that is wanted.
     fn set(&self, time: Time) {
-        // A sample that comes after simulation has been switched off is late.
         if let Some(simulated) = self.lock().as_mut() {
             *simulated = time;
         }
@@ -51,11 +54,12 @@ impl NodeClock {
     }
 }
 
-/// Listens to `/clock` while `use_sim_time` is set.
+/// Listens to `/clock` from when `use_sim_time` is set for the first time.
 ///
 /// ros2-client has a subscription of its own to that topic, with a type that nobody publishes.
 pub struct SimTime {
     clock: NodeClock,
+    // Kept once it is there: peers on Fast DDS do not notice that a single subscription has ended.
     listener: Option<smol::Task<()>>,
 }
 
@@ -74,27 +78,22 @@ impl SimTime {
     /// # Errors
     /// [`EndpointError`] when the middleware refuses the subscription.
     pub fn follow(&mut self, ros: &mut RosNode, on: bool) -> Result<(), EndpointError> {
-        if on == self.listener.is_some() {
-            return Ok(());
-        }
-        if on {
+        if on && self.listener.is_none() {
             let subscription = ros.subscription(CLOCK, &LATEST)?;
-            self.clock.simulate(true);
             self.listener = Some(smol::spawn(listen(subscription, self.clock.clone())));
-            log::info!("time is simulated: it comes from {CLOCK}");
-        } else {
-            self.close();
-            log::info!("time is the system's");
+        }
+        if self.clock.simulate(on) {
+            let source = if on { CLOCK } else { "the system" };
+            log::info!("time comes from {source}");
         }
         Ok(())
     }
 
     /// Ends the subscription, which has to be gone before the node is.
-    pub fn close(&mut self) {
-        if let Some(listener) = self.listener.take() {
+    pub fn close(self) {
+        if let Some(listener) = self.listener {
             smol::block_on(listener.cancel());
         }
-        self.clock.simulate(false);
     }
 }
 
@@ -140,13 +139,13 @@ mod tests {
         clock.set(time);
         assert!(clock.now().sec > 1_000_000_000, "the system's");
 
-        clock.simulate(true);
+        assert!(clock.simulate(true));
         assert_eq!(clock.now(), Time::default());
         clock.set(time);
-        clock.simulate(true);
+        assert!(!clock.simulate(true));
         assert_eq!(clock.now(), time, "wanted twice is wanted once");
 
-        clock.simulate(false);
+        assert!(clock.simulate(false));
         assert!(clock.now().sec > 1_000_000_000);
     }
 }

@@ -27,6 +27,12 @@ const OWN: &str = "tanker_pose";
 const ECHO: &str = "ros2_client::rosout";
 /// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
 const FALSE_ALARM_AT_END: &str = "rustdds::network";
+/// Of every publisher or subscription of `/clock` `RustDDS` reports that its type is not the one by which
+/// the client library has subscribed, which is the wrong one.
+const FALSE_ALARM_OF_CLOCK: (&str, &str) = (
+    "rustdds::discovery::discovery_db",
+    "type was: \"builtin_interfaces::msg::dds_::Time_\"",
+);
 
 static LOGGER: OnceLock<NodeLog> = OnceLock::new();
 
@@ -148,6 +154,10 @@ impl Log for NodeLog {
         }
         let leaving = self.leaving.load(Ordering::Relaxed);
         if leaving && record.target().starts_with(FALSE_ALARM_AT_END) {
+            return;
+        }
+        let (source, wrong_type) = FALSE_ALARM_OF_CLOCK;
+        if record.target() == source && record.args().to_string().contains(wrong_type) {
             return;
         }
         if self.console_on {

@@ -1,7 +1,7 @@
 //! Services whose replies arrive, however long they are.
 //!
 //! A reply carries the identity of its request as inline QoS. `RustDDS` splits a sample that does not fit
-//! the path's MTU, about 1400 bytes, and writes inline QoS into the pieces with one byte too many: no
+//! the path's MTU, about 1250 bytes of 1500, and writes inline QoS into the pieces with one byte too many: no
 //! other implementation can read them, and the client waits forever. A long reply is therefore sent here
 //! as one sample in one UDP datagram, which the network splits and joins below RTPS. A short placeholder,
 //! meant for nobody, takes its place in the writer's sequence, so that the writer's own bookkeeping holds.
@@ -28,8 +28,9 @@ use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, reliable};
 use super::rtps::{self, Data, Packet};
 
-/// Longest reply that is left to `RustDDS`, bytes: below the least that it sends in one piece.
-const SHORT_BYTES: usize = 1200;
+/// Longest reply that is left to `RustDDS`, bytes: below what it sends in one piece where the MTU is 1280,
+/// the least of IPv6 and of most tunnels.
+const SHORT_BYTES: usize = 1000;
 /// Longest reply at all, bytes: what UDP carries, less the headers.
 const LONGEST_BYTES: usize = 65_000;
 /// How long a reply may wait for a client that does not acknowledge.
