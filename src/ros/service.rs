@@ -1,10 +1,11 @@
 //! Services whose replies arrive, however long they are.
 //!
-//! A reply carries the identity of its request as inline QoS. `RustDDS` splits a sample that does not fit
-//! the path's MTU, about 1250 bytes of 1500, and writes inline QoS into the pieces with one byte too many: no
-//! other implementation can read them, and the client waits forever. A long reply is therefore sent here
-//! as one sample in one UDP datagram, which the network splits and joins below RTPS. A short placeholder,
-//! meant for nobody, takes its place in the writer's sequence, so that the writer's own bookkeeping holds.
+//! A reply carries the identity of its request in front of its data. `RustDDS` splits a sample that does
+//! not fit the path's MTU, about 1250 bytes of 1500, and writes that identity into the pieces with one byte
+//! too many: no other implementation can read them, and the client waits forever. A long reply is therefore
+//! sent here as one sample in one UDP datagram, which the network splits and joins below RTPS. A short
+//! placeholder, meant for nobody, takes its place in the writer's sequence, so that the writer's own
+//! bookkeeping holds.
 //!
 //! What that costs: a long reply is not repeated when it is lost on the way.
 
