@@ -117,7 +117,7 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
             match requests.select_next_some().await {
                 Ok((request, info)) => {
                     let response = answer(request);
-                    if let Err(error) = replies.send(identity(&info), &response) {
+                    if let Err(error) = replies.send(identity(&info), &response).await {
                         log::warn!("service {name}: {error}");
                     }
                 }
@@ -174,7 +174,7 @@ struct Replies {
 }
 
 impl Replies {
-    fn send<Response: Serialize + Default>(
+    async fn send<Response: Serialize + Default>(
         &mut self,
         request: RmwRequestId,
         response: &Response,
@@ -182,27 +182,28 @@ impl Replies {
         let payload = encode(response)?;
         let length = payload.len();
         if length <= SHORT_BYTES {
-            return self.write(request, payload);
+            return self.write(request, payload).await;
         }
         let nothing = encode(&Response::default())?;
         if length > LONGEST_BYTES {
-            self.write(request, nothing)?;
+            self.write(request, nothing).await?;
             return Err(ReplyError::TooLong { length });
         }
         let sent = self.send_datagrams(request, &payload);
         // Meant for nobody: no client has this identity.
-        self.write(RmwRequestId::default(), nothing)?;
+        self.write(RmwRequestId::default(), nothing).await?;
         sent.map_err(|reason| ReplyError::Datagram { length, reason })
     }
 
-    fn write(&mut self, request: RmwRequestId, payload: Vec<u8>) -> Result<(), ReplyError> {
+    async fn write(&mut self, request: RmwRequestId, payload: Vec<u8>) -> Result<(), ReplyError> {
         let options = WriteOptionsBuilder::new()
             .source_timestamp(Timestamp::now())
             .related_sample_identity(SampleIdentity::from(request))
             .build();
         let written = self
             .writer
-            .write_with_options(payload, options)
+            .async_write_with_options(payload, options)
+            .await
             .map_err(|error: WriteError<_>| ReplyError::Write(error.forget_data().to_string()))?;
         self.next_sequence_number = i64::from(written.sequence_number) + 1;
         Ok(())
