@@ -15,25 +15,30 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use futures::{StreamExt, pin_mut};
 use ros2_client::dds::rustdds::bytes::Bytes;
 use ros2_client::dds::rustdds::dds::WriteError;
+use ros2_client::dds::rustdds::discovery::{DiscoveredReaderData, ReaderProxy};
 use ros2_client::dds::rustdds::no_key::{DataWriter, SerializerAdapter};
 use ros2_client::dds::rustdds::{
     DomainParticipant, QosPolicies, RTPSEntity, RepresentationIdentifier, SampleIdentity,
     SequenceNumber, Timestamp, TopicKind, WriteOptionsBuilder, serialization,
 };
 use ros2_client::qos::WhenFull;
-use ros2_client::{Gid, MessageInfo, RmwRequestId, Subscription};
+use ros2_client::{MessageInfo, RmwRequestId, Subscription};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, reliable};
-use super::rtps::{self, Data, Packet};
+use super::rtps::{self, Data, GuidBytes, Packet};
 
 /// Longest reply that is left to `RustDDS`, bytes: below what it sends in one piece where the MTU is 1280,
 /// the least of IPv6 and of most tunnels.
 const SHORT_BYTES: usize = 1000;
 /// Longest reply at all, bytes: what UDP carries, less the headers.
 const LONGEST_BYTES: usize = 65_000;
+/// How long a reply waits for its client to be discovered: a client may find the service first. As long as
+/// that, and no longer, can a client that does not exist hold up the others of one service.
+const DISCOVERY: Duration = Duration::from_millis(500);
+const POLL: Duration = Duration::from_millis(10);
 /// How long a reply may wait for a client that does not acknowledge.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// As `rmw_qos_profile_services_default` has it.
@@ -181,6 +186,7 @@ impl Replies {
     ) -> Result<(), ReplyError> {
         let payload = encode(response)?;
         let length = payload.len();
+        let readers = self.readers_of(request).await;
         if length <= SHORT_BYTES {
             return self.write(request, payload).await;
         }
@@ -189,7 +195,7 @@ impl Replies {
             self.write(request, nothing).await?;
             return Err(ReplyError::TooLong { length });
         }
-        let sent = self.send_datagrams(request, &payload);
+        let sent = self.send_datagrams(request, &readers, &payload);
         // Meant for nobody: no client has this identity.
         self.write(RmwRequestId::default(), nothing).await?;
         sent.map_err(|reason| ReplyError::Datagram { length, reason })
@@ -209,22 +215,46 @@ impl Replies {
         Ok(())
     }
 
-    /// Sends the reply to all readers that the client's participant has on the topic: those that did not
-    /// ask know by the identity that it is not for them.
-    fn send_datagrams(&self, request: RmwRequestId, payload: &[u8]) -> Result<(), String> {
+    /// Returns the readers that the client's participant has on the topic, none after a while in vain. Those
+    /// that did not ask know by the identity that a reply is not for them.
+    async fn readers_of(&self, request: RmwRequestId) -> Vec<ReaderProxy> {
         let client = request.writer_gid.to_bytes16();
+        let is_of_client = |reader: &DiscoveredReaderData| {
+            let guid = reader.reader_proxy.remote_reader_guid.to_bytes();
+            guid[..12] == client[..12] && *reader.subscription_topic_data.topic_name() == self.topic
+        };
+        let begin = Instant::now();
+        let mut waited = false;
+        loop {
+            let mut readers = self.participant.discovered_readers();
+            readers.retain(is_of_client);
+            let found = !readers.is_empty();
+            if found || begin.elapsed() > DISCOVERY {
+                if found && waited {
+                    // The writer hears of a reader a little after the graph does.
+                    smol::Timer::after(POLL).await;
+                }
+                return readers.into_iter().map(|r| r.reader_proxy).collect();
+            }
+            waited = true;
+            smol::Timer::after(POLL).await;
+        }
+    }
+
+    fn send_datagrams(
+        &self,
+        request: RmwRequestId,
+        readers: &[ReaderProxy],
+        payload: &[u8],
+    ) -> Result<(), String> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).map_err(|e| e.to_string())?;
         let mut sent = false;
         let mut failure = "the client is not in the graph, or has no IPv4 address".to_owned();
-        for reader in self.participant.discovered_readers() {
-            let guid = reader.reader_proxy.remote_reader_guid.to_bytes();
-            let topic = reader.subscription_topic_data.topic_name();
-            if guid[..12] != client[..12] || *topic != self.topic {
-                continue;
-            }
-            let packet = self.packet(request, Gid::from(guid), payload);
-            for locator in reader.reader_proxy.unicast_locator_list {
-                let address = SocketAddr::from(locator);
+        for reader in readers {
+            let guid = reader.remote_reader_guid.to_bytes();
+            let packet = self.packet(request, guid, payload);
+            for locator in &reader.unicast_locator_list {
+                let address = SocketAddr::from(*locator);
                 if !locator.is_udp() || !address.is_ipv4() {
                     continue;
                 }
@@ -237,14 +267,14 @@ impl Replies {
         if sent { Ok(()) } else { Err(failure) }
     }
 
-    fn packet(&self, request: RmwRequestId, reader: Gid, payload: &[u8]) -> Vec<u8> {
-        let (writer, reader) = (self.writer.guid().to_bytes(), reader.to_bytes16());
+    fn packet(&self, request: RmwRequestId, reader: GuidBytes, payload: &[u8]) -> Vec<u8> {
+        let writer = self.writer.guid().to_bytes();
         let mut identity = request.writer_gid.to_bytes16().to_vec();
         identity.extend(rtps::sequence_number(request.sequence_number));
         let now = SystemTime::now()
             .duration_since(UNIX_EPOCH)
             .unwrap_or_default();
-        let entity = |guid: [u8; 16]| [guid[12], guid[13], guid[14], guid[15]];
+        let entity = |guid: GuidBytes| [guid[12], guid[13], guid[14], guid[15]];
         Packet::from_participant(&writer)
             .to_participant(&reader)
             .written_at(
