@@ -1,0 +1,213 @@
+//! One end of one topic, and the policies that can be overridden on it.
+
+use std::time::Duration;
+
+use ros2_client::qos::{Durability, History, Reliability, WhenFull};
+
+use super::PREFIX;
+use crate::config::{Kind, ParameterValue};
+use crate::ros::participant::QosProfile;
+
+/// Most samples that a topic may keep.
+const DEEPEST: i64 = 10_000;
+/// Longest deadline that the wire holds, ns.
+const LONGEST_NS: i64 = i32::MAX as i64 * 1_000_000_000;
+
+/// Which end of a topic the node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It listens.
+    Subscription,
+    /// It speaks.
+    Publisher,
+}
+
+impl Role {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Subscription => "subscription",
+            Self::Publisher => "publisher",
+        }
+    }
+}
+
+/// One policy that can be overridden.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Policy {
+    Reliability,
+    Durability,
+    History,
+    Depth,
+    Deadline,
+}
+
+impl Policy {
+    pub(super) const ALL: [Self; 5] = [
+        Self::Reliability,
+        Self::Durability,
+        Self::History,
+        Self::Depth,
+        Self::Deadline,
+    ];
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Reliability => "reliability",
+            Self::Durability => "durability",
+            Self::History => "history",
+            Self::Depth => "depth",
+            Self::Deadline => "deadline",
+        }
+    }
+
+    /// What the policy may be. The defaults do not count: they are each topic's own.
+    pub(super) const fn kind(self) -> Kind {
+        const fn choice(allowed: &'static [&'static str]) -> Kind {
+            Kind::Choice {
+                default: "",
+                allowed,
+            }
+        }
+        const fn integer(min: i64, max: i64) -> Kind {
+            Kind::Integer {
+                default: min,
+                min,
+                max,
+            }
+        }
+        match self {
+            Self::Reliability => choice(&["reliable", "best_effort"]),
+            Self::Durability => choice(&["volatile", "transient_local"]),
+            Self::History => choice(&["keep_last", "keep_all"]),
+            Self::Depth => integer(1, DEEPEST),
+            Self::Deadline => integer(0, LONGEST_NS),
+        }
+    }
+
+    pub(super) const fn description(self) -> &'static str {
+        match self {
+            Self::Reliability => "whether lost samples are repeated",
+            Self::Durability => "whether late subscribers get earlier samples",
+            Self::History => "how many samples are kept",
+            Self::Depth => "samples that keep_last keeps",
+            Self::Deadline => "ns, longest time between samples; 0: none",
+        }
+    }
+}
+
+/// One end of one topic, with the quality of service that it opens with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Endpoint {
+    pub(super) topic: String,
+    pub(super) role: Role,
+    pub(super) qos: QosProfile,
+    // Survives a history that does not need it.
+    depth: i64,
+}
+
+impl Endpoint {
+    /// Returns the end of the topic with this absolute name, and what holds unless it is overridden.
+    #[must_use]
+    pub fn new(topic: String, role: Role, qos: &QosProfile) -> Self {
+        let depth = match qos.history {
+            History::KeepLast { depth } => i64::try_from(depth).unwrap_or(DEEPEST),
+            History::KeepAll => 1,
+        };
+        Self {
+            topic,
+            role,
+            qos: qos.clone(),
+            depth,
+        }
+    }
+
+    pub(super) fn name_of(&self, policy: Policy) -> String {
+        format!(
+            "{PREFIX}{}.{}.{}",
+            self.topic,
+            self.role.name(),
+            policy.name()
+        )
+    }
+
+    pub(super) fn get(&self, policy: Policy) -> ParameterValue {
+        let text = |text: &str| ParameterValue::String(text.to_owned());
+        match policy {
+            Policy::Reliability => text(match self.qos.reliability {
+                Reliability::BestEffort => "best_effort",
+                Reliability::Reliable { .. } => "reliable",
+            }),
+            Policy::Durability => text(match self.qos.durability {
+                Durability::Volatile => "volatile",
+                Durability::TransientLocal => "transient_local",
+            }),
+            Policy::History => text(match self.qos.history {
+                History::KeepLast { .. } => "keep_last",
+                History::KeepAll => "keep_all",
+            }),
+            Policy::Depth => ParameterValue::Integer(self.depth),
+            Policy::Deadline => ParameterValue::Integer(self.qos.deadline.map_or(0, |deadline| {
+                i64::try_from(deadline.as_nanos()).unwrap_or(LONGEST_NS)
+            })),
+        }
+    }
+
+    /// Sets a policy; false when the value is not among those that it can have.
+    pub(super) fn set(&mut self, policy: Policy, value: &ParameterValue) -> bool {
+        let allowed = match (policy.kind(), value) {
+            (Kind::Choice { allowed, .. }, ParameterValue::String(word)) => {
+                allowed.contains(&word.as_str())
+            }
+            (Kind::Integer { min, max, .. }, ParameterValue::Integer(number)) => {
+                (min..=max).contains(number)
+            }
+            _ => false,
+        };
+        if !allowed {
+            return false;
+        }
+        match (policy, value) {
+            (Policy::Reliability, ParameterValue::String(word)) => {
+                // A full window never makes the node wait.
+                let when_full = WhenFull::Fail;
+                self.qos.reliability = if word == "reliable" {
+                    Reliability::Reliable { when_full }
+                } else {
+                    Reliability::BestEffort
+                };
+            }
+            (Policy::Durability, ParameterValue::String(word)) => {
+                self.qos.durability = if word == "transient_local" {
+                    Durability::TransientLocal
+                } else {
+                    Durability::Volatile
+                };
+            }
+            (Policy::History, ParameterValue::String(word)) => {
+                self.qos.history = if word == "keep_all" {
+                    History::KeepAll
+                } else {
+                    self.keep_last()
+                };
+            }
+            (Policy::Depth, ParameterValue::Integer(depth)) => {
+                self.depth = *depth;
+                if self.qos.history != History::KeepAll {
+                    self.qos.history = self.keep_last();
+                }
+            }
+            (_, ParameterValue::Integer(deadline)) => {
+                let deadline = u64::try_from(*deadline).ok().filter(|ns| *ns > 0);
+                self.qos.deadline = deadline.map(Duration::from_nanos);
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    fn keep_last(&self) -> History {
+        History::KeepLast {
+            depth: usize::try_from(self.depth).unwrap_or(1),
+        }
+    }
+}
