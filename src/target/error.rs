@@ -59,4 +59,48 @@ pub enum MarkerMapError {
         "{place}: all markers lie on one line (spread across it is {ratio:.1e} of that along it, need {need:.0e})"
     )]
     OnOneLine { place: Place, ratio: f64, need: f64 },
+    /// A tag id whose corners would have no ids.
+    #[error("{place}: tag id must be 0 to {max}, got {id}", max = super::Tag::MAX_ID)]
+    TagIdOutOfRange { place: Place, id: i64 },
+    /// One id for two tags.
+    #[error("{place}: tag id {id} is already taken at {first}")]
+    DuplicateTag { place: Place, id: u32, first: Place },
+    /// A single marker with the id of a tag's corner.
+    #[error(
+        "{place}: marker id {id} is that of a corner of the tag at {tag} (10 x tag id + corner)"
+    )]
+    CornerId { place: Place, id: u32, tag: Place },
+    /// A side that no tag has.
+    #[error("{place}: size_m of tag {id} must be {least_m} to {most_m} m, got {size_m:?}")]
+    TagSize {
+        place: Place,
+        id: u32,
+        size_m: f64,
+        least_m: f64,
+        most_m: f64,
+    },
+    /// A number of a tag's pose that is NaN, infinite or far off.
+    #[error("{place}: {field} of tag {id} must be from -{limit} to {limit}, got {value:?}")]
+    TagNumber {
+        place: Place,
+        id: u32,
+        field: &'static str,
+        value: f64,
+        limit: f64,
+    },
+    /// No attitude, half of one, or two.
+    #[error(
+        "{place}: tag {id} needs its attitude, as roll_deg, pitch_deg and yaw_deg or as qx, qy, qz and qw"
+    )]
+    TagAttitude { place: Place, id: u32 },
+    /// A quaternion that is no rotation.
+    #[error("{place}: the quaternion of tag {id} must have length 1, got {norm}")]
+    TagQuaternion { place: Place, id: u32, norm: f64 },
+    /// A family that detectors cannot name.
+    #[error("{place}: family of tag {id} must be one word such as tag36h11, got {family:?}")]
+    TagFamily {
+        place: Place,
+        id: u32,
+        family: String,
+    },
 }

@@ -2,17 +2,25 @@
 
 use nalgebra::Point3;
 use serde::Deserialize;
-use serde_saphyr::Spanned;
+use serde_saphyr::{Location, Spanned};
 
 use super::check::{Part, check};
-use super::{Marker, MarkerMap, MarkerMapError};
+use super::tag_file::{self, RawTag};
+use super::{Marker, MarkerMap, MarkerMapError, Tag};
 use crate::yaml::{self, Place};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawMap {
     name: String,
+    #[serde(default = "nothing")]
     markers: Spanned<Vec<RawMarker>>,
+    #[serde(default)]
+    tags: Vec<RawTag>,
+}
+
+fn nothing() -> Spanned<Vec<RawMarker>> {
+    Spanned::new(Vec::new(), Location::UNKNOWN, Location::UNKNOWN)
 }
 
 /// `id` is wider than ids are, so that one out of range is told as such.
@@ -28,30 +36,71 @@ struct RawMarker {
 pub(super) fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
     let raw: RawMap = yaml::read(text, source)?;
     let entries = &raw.markers.value;
-    let markers = entries
+    let mut markers = entries
         .iter()
-        .map(|entry| {
-            let id = u32::try_from(entry.id.value).map_err(|_| MarkerMapError::IdOutOfRange {
-                place: Place::at(source, entry.id.referenced),
-                id: entry.id.value,
-            })?;
-            Ok(Marker {
-                id,
-                marker_in_tanker: Point3::new(entry.x.value, entry.y.value, entry.z.value),
-            })
-        })
+        .map(|entry| entry.marker(source))
         .collect::<Result<Vec<_>, MarkerMapError>>()?;
+    let tags = tag_file::tags(&raw.tags, source)?;
+    check_corner_ids(&markers, &tags, |marker, tag| {
+        let at = |id: &Spanned<i64>| Place::at(source, id.referenced);
+        (at(&entries[marker].id), at(&raw.tags[tag].id))
+    })?;
+    markers.extend(tags.iter().flat_map(Tag::corners).map(Marker::from));
     check(&markers, |part| {
+        let (id, x, y, z) = match part {
+            Part::Markers => return Place::at(source, raw.markers.referenced),
+            // Corners stand behind the single markers, four for each tag.
+            Part::Id(index) | Part::Coordinate(index, _) => {
+                match index.checked_sub(entries.len()) {
+                    None => {
+                        let entry = &entries[index];
+                        (&entry.id, &entry.x, &entry.y, &entry.z)
+                    }
+                    Some(corner) => {
+                        let entry = &raw.tags[corner / 4];
+                        (&entry.id, &entry.x, &entry.y, &entry.z)
+                    }
+                }
+            }
+        };
         let location = match part {
-            Part::Markers => raw.markers.referenced,
-            Part::Id(index) => entries[index].id.referenced,
-            Part::Coordinate(index, 0) => entries[index].x.referenced,
-            Part::Coordinate(index, 1) => entries[index].y.referenced,
-            Part::Coordinate(index, _) => entries[index].z.referenced,
+            Part::Markers | Part::Id(_) => id.referenced,
+            Part::Coordinate(_, 0) => x.referenced,
+            Part::Coordinate(_, 1) => y.referenced,
+            Part::Coordinate(..) => z.referenced,
         };
         Place::at(source, location)
     })?;
-    Ok(MarkerMap::sorted(&raw.name, markers))
+    Ok(MarkerMap::sorted(&raw.name, markers, tags))
+}
+
+impl RawMarker {
+    fn marker(&self, source: &str) -> Result<Marker, MarkerMapError> {
+        let id = u32::try_from(self.id.value).map_err(|_| MarkerMapError::IdOutOfRange {
+            place: Place::at(source, self.id.referenced),
+            id: self.id.value,
+        })?;
+        Ok(Marker {
+            id,
+            marker_in_tanker: Point3::new(self.x.value, self.y.value, self.z.value),
+        })
+    }
+}
+
+/// Checks that no single marker has the id of a corner; `places` of a marker and a tag, by index.
+fn check_corner_ids(
+    markers: &[Marker],
+    tags: &[Tag],
+    places: impl Fn(usize, usize) -> (Place, Place),
+) -> Result<(), MarkerMapError> {
+    for (index, &Marker { id, .. }) in markers.iter().enumerate() {
+        let of = Tag::id_of_corner(id);
+        if let Some(taken) = tags.iter().position(|tag| Some(tag.id) == of) {
+            let (place, tag) = places(index, taken);
+            return Err(MarkerMapError::CornerId { place, id, tag });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What the tanker carries: marker id -> point on the tanker.
+//! What the tanker carries: marker id -> point on the tanker; tag id -> its four corners, as four such points.
 //!
 //! A [`MarkerMap`] exists only checked: ids unique, coordinates sane, and the points spread enough
 //! that a pose can follow from them. Knows the tanker frame (x forward, y left, z up; metres) and
@@ -10,10 +10,13 @@
 mod check;
 mod error;
 mod file;
+mod tag;
+mod tag_file;
 
 use nalgebra::Point3;
 
 pub use error::MarkerMapError;
+pub use tag::Tag;
 
 use crate::yaml::Place;
 
@@ -26,12 +29,23 @@ pub struct Marker {
     pub marker_in_tanker: Point3<f64>,
 }
 
+impl From<(u32, Point3<f64>)> for Marker {
+    fn from((id, marker_in_tanker): (u32, Point3<f64>)) -> Self {
+        Self {
+            id,
+            marker_in_tanker,
+        }
+    }
+}
+
 /// A checked marker map: at least three markers, ids unique, not all on one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarkerMap {
     name: String,
-    /// Ascending id.
+    /// Ascending id; the corners of tags among them.
     markers: Vec<Marker>,
+    /// Ascending id.
+    tags: Vec<Tag>,
 }
 
 /// Name and text of each map that comes with the program.
@@ -48,7 +62,7 @@ impl MarkerMap {
     pub fn new(name: &str, markers: &[Marker]) -> Result<Self, MarkerMapError> {
         let whole = Place::whole(&format!("marker map `{name}`"));
         check::check(markers, |_| whole.clone())?;
-        Ok(Self::sorted(name, markers.to_vec()))
+        Ok(Self::sorted(name, markers.to_vec(), Vec::new()))
     }
 
     /// Returns the checked map from YAML text.
@@ -96,7 +110,7 @@ impl MarkerMap {
         &self.name
     }
 
-    /// Returns all markers, ascending id.
+    /// Returns all markers, ascending id; the corners of tags are among them.
     #[must_use]
     pub fn markers(&self) -> &[Marker] {
         &self.markers
@@ -112,11 +126,27 @@ impl MarkerMap {
         Some(self.markers[index].marker_in_tanker)
     }
 
-    fn sorted(name: &str, mut markers: Vec<Marker>) -> Self {
+    /// Returns the tag with this id; none if the map holds no such tag.
+    #[must_use]
+    pub fn tag(&self, id: u32) -> Option<&Tag> {
+        let index = self.tags.binary_search_by_key(&id, |tag| tag.id).ok()?;
+        Some(&self.tags[index])
+    }
+
+    /// Returns where a marker sits that is no tag's corner, tanker frame, m.
+    #[must_use]
+    pub fn single(&self, id: u32) -> Option<Point3<f64>> {
+        let is_corner = Tag::id_of_corner(id).is_some_and(|tag| self.tag(tag).is_some());
+        if is_corner { None } else { self.get(id) }
+    }
+
+    fn sorted(name: &str, mut markers: Vec<Marker>, mut tags: Vec<Tag>) -> Self {
         markers.sort_unstable_by_key(|marker| marker.id);
+        tags.sort_unstable_by_key(|tag| tag.id);
         Self {
             name: name.to_owned(),
             markers,
+            tags,
         }
     }
 }
