@@ -7,6 +7,7 @@
 //! ```text
 //! bin, ros            the only floors that know files, clocks, threads and ros2-client
 //! simulation          seeded approaches and synthetic detections, for tools and tests
+//! picture             what a frame looks like in space, for tools that draw
 //! pipeline, config    one straight line a frame; raw parameters -> checked settings
 //! estimation          a pose from known markers and pixels: initialise, iterate, refine, judge, covariance
 //! camera, target      pixel <-> ray; marker id -> point on the tanker
@@ -21,6 +22,7 @@ pub mod camera;
 pub mod config;
 pub mod estimation;
 pub mod geometry;
+pub mod picture;
 pub mod pipeline;
 pub mod ros;
 pub mod simulation;

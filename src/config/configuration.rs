@@ -19,6 +19,23 @@ pub struct Configuration {
     pub publish_tf: bool,
     /// Whether time comes from /clock.
     pub use_sim_time: bool,
+    /// Whether to publish what RViz and Foxglove can draw.
+    pub publish_markers: bool,
+    /// Where detections come from.
+    pub input: Input,
+    /// Most corrected bits of a tag.
+    pub max_hamming: i32,
+}
+
+/// Which messages bring the detections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input {
+    /// `tanker_pose/FeaturePointArray`.
+    FeaturePoints,
+    /// `vision_msgs/Detection2DArray`.
+    Detections,
+    /// `apriltag_msgs/AprilTagDetectionArray`.
+    AprilTags,
 }
 
 impl From<&Parameters> for Configuration {
@@ -34,6 +51,13 @@ impl From<&Parameters> for Configuration {
             tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
             publish_tf: parameters.bool("publish_tf"),
             use_sim_time: parameters.bool("use_sim_time"),
+            publish_markers: parameters.bool("publish_markers"),
+            input: match parameters.text("input") {
+                "detections" => Input::Detections,
+                "apriltags" => Input::AprilTags,
+                _ => Input::FeaturePoints,
+            },
+            max_hamming: i32::try_from(parameters.count("max_hamming")).unwrap_or(0),
         }
     }
 }
@@ -156,6 +180,9 @@ mod tests {
             ("tanker_frame_id", String("kc46".into())),
             ("publish_tf", Bool(true)),
             ("use_sim_time", Bool(true)),
+            ("publish_markers", Bool(true)),
+            ("input", String("apriltags".into())),
+            ("max_hamming", Integer(2)),
             ("pixel_sigma_px", Double(0.25)),
             ("rectified", Bool(true)),
             ("initialisation", String("global".into())),
@@ -170,13 +197,29 @@ mod tests {
             (found.marker_map.as_str(), found.tanker_frame_id.as_str()),
             ("fin6", "kc46")
         );
-        assert!(found.publish_tf && found.use_sim_time && found.settings.rectified);
+        assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
+        assert!(found.use_sim_time);
+        assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
         assert_eq!(estimator.initialisation, Initialisation::Global);
         assert_eq!(estimator.refinement, Refinement::None);
         assert_eq!((estimator.max_outliers, estimator.min_points), (1, 5));
         assert!((estimator.trust_probability - 0.95).abs() < f64::EPSILON);
         assert!((estimator.max_ambiguity - 0.5).abs() < f64::EPSILON);
+    }
+
+    #[test]
+    fn every_word_of_input_has_its_own_meaning() {
+        for (word, meaning) in [
+            ("feature_points", Input::FeaturePoints),
+            ("detections", Input::Detections),
+            ("apriltags", Input::AprilTags),
+        ] {
+            assert_eq!(
+                configuration(&[("input", String(word.into()))]).input,
+                meaning
+            );
+        }
     }
 
     #[test]

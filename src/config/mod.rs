@@ -10,7 +10,7 @@ mod parameters;
 mod table;
 mod value;
 
-pub use configuration::Configuration;
+pub use configuration::{Configuration, Input};
 pub use parameters::Parameters;
 pub use table::{Kind, ParameterSpec, TABLE};
 pub use value::{ParameterError, ParameterValue};

@@ -137,6 +137,32 @@ pub const TABLE: &[ParameterSpec] = &[
         description: "also publish trusted poses to /tf, parent: the camera's optical frame",
     },
     ParameterSpec {
+        name: "publish_markers",
+        kind: Kind::Bool { default: false },
+        read_only: true,
+        description: "also publish markers, which RViz and Foxglove draw",
+    },
+    ParameterSpec {
+        name: "input",
+        kind: Kind::Choice {
+            default: "feature_points",
+            allowed: &["feature_points", "detections", "apriltags"],
+        },
+        read_only: true,
+        description: "where detections come from: topic feature_points (tanker_pose/FeaturePointArray), or topic detections \
+                      with vision_msgs/Detection2DArray (detections) or apriltag_msgs/AprilTagDetectionArray (apriltags)",
+    },
+    ParameterSpec {
+        name: "max_hamming",
+        kind: Kind::Integer {
+            default: 0,
+            min: 0,
+            max: 10,
+        },
+        read_only: true,
+        description: "tags with more corrected bits than this are left out",
+    },
+    ParameterSpec {
         name: "pixel_sigma_px",
         kind: Kind::Double {
             default: 0.5,

@@ -83,9 +83,12 @@ impl Refusal {
         match self {
             Self::NoCameraInfo => OutcomeCode::NoCameraInfo,
             Self::InvalidCameraInfo(_) => OutcomeCode::InvalidCameraInfo,
-            Self::FrameMismatch { .. } => OutcomeCode::FrameMismatch,
+            Self::FrameMismatch { .. } | Self::OtherImage { .. } => OutcomeCode::FrameMismatch,
             Self::InvalidStamp(_) => OutcomeCode::ZeroStamp,
-            Self::UnknownId { .. } => OutcomeCode::UnknownId,
+            Self::UnknownId { .. }
+            | Self::InvalidId { .. }
+            | Self::UnknownTag { .. }
+            | Self::WrongFamily { .. } => OutcomeCode::UnknownId,
             Self::DuplicateId { .. } => OutcomeCode::DuplicateId,
             Self::NotFinite { .. } => OutcomeCode::NotFinite,
             Self::InvalidSigma { .. } => OutcomeCode::InvalidSigma,

@@ -33,6 +33,44 @@ pub enum Refusal {
         /// All such ids of the frame.
         ids: Vec<u32>,
     },
+    /// A detection of another message type that does not name one marker.
+    #[error("expected {expected}, got {got}")]
+    InvalidId {
+        /// What would do.
+        expected: &'static str,
+        /// What came.
+        got: String,
+    },
+    /// Tags that are not on the tanker.
+    #[error("expected tags of the marker map, got unknown tag {}", list(ids))]
+    UnknownTag {
+        /// All such ids of the frame.
+        ids: Vec<i32>,
+    },
+    /// A tag of another family.
+    #[error(
+        "expected tag {id} of family {}, got family {}",
+        clip(expected),
+        clip(got)
+    )]
+    WrongFamily {
+        /// The tag's id.
+        id: u32,
+        /// Its family in the marker map.
+        expected: String,
+        /// Its family in the detection.
+        got: String,
+    },
+    /// A detection whose own header is not that of its array.
+    #[error("expected detections of one image, got id {id} from frame_id '{}' at {} s {} ns", clip(frame_id), .stamp.sec, .stamp.nanosec)]
+    OtherImage {
+        /// Marker id.
+        id: u32,
+        /// Stamp of the detection.
+        stamp: Stamp,
+        /// `frame_id` of the detection.
+        frame_id: String,
+    },
     /// One marker seen twice.
     #[error("expected each id once, got id {id} {count} times")]
     DuplicateId {
@@ -143,6 +181,14 @@ pub enum Refusal {
         /// The largest to accept.
         limit: f64,
     },
+}
+
+impl Refusal {
+    /// Returns a foreign word as messages show it, cut where it is long.
+    #[must_use]
+    pub fn shown(word: &str) -> String {
+        clip(word)
+    }
 }
 
 impl From<EstimateError> for Refusal {

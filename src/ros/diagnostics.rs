@@ -85,13 +85,15 @@ pub struct Situation<'a> {
     pub now: Time,
     /// The node's name without its namespace.
     pub node: &'a str,
+    /// Topic of the detections.
+    pub input: &'a str,
     /// Name of the marker map.
     pub marker_map: &'a str,
     /// What is known of the camera.
     pub camera: &'a CameraState,
     /// Message of the last refusal since the last report.
     pub last_refusal: Option<&'a str>,
-    /// Publishers of `feature_points` in the graph.
+    /// Publishers of the detections in the graph.
     pub publishers: usize,
     /// Longest time from a message to its outcome since the last report.
     pub slowest: Duration,
@@ -147,11 +149,12 @@ impl Reporter {
 /// Returns the level and the summary of the last period.
 fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u8, String) {
     let refused = frames.saturating_sub(estimates);
+    let input = situation.input;
     let why = situation.last_refusal.unwrap_or("see status");
     if frames == 0 {
         let message = match situation.publishers {
-            0 => "no feature_points: no publisher".to_owned(),
-            n => format!("no feature_points, though {n} publisher(s) exist: check QoS and network"),
+            0 => format!("no {input}: no publisher"),
+            n => format!("no {input}, though {n} publisher(s) exist: check QoS and network"),
         };
         (DiagnosticStatus::STALE, message)
     } else if estimates == 0 {
@@ -235,6 +238,7 @@ mod tests {
         Situation {
             now: Time { sec: 7, nanosec: 8 },
             node: "tanker_pose",
+            input: "feature_points",
             marker_map: "paper",
             camera,
             last_refusal: Some("need 4 points, got 3"),

@@ -7,14 +7,18 @@ use ros2_client::{Publisher, WriteError};
 use super::clock::NodeClock;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
+use super::input::{InputMessage, InputReader};
 use super::messages::{
-    CameraInfo, DiagnosticArray, EstimatorStatus, FeaturePointArray, Header, Message,
+    CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message,
     PoseWithCovarianceStamped, TFMessage,
 };
 use super::once::SaidOnce;
 use crate::config::Settings;
 use crate::estimation::Solution;
-use crate::pipeline::{OutcomeCode, Pipeline, Stamp};
+use crate::picture::Picture;
+use crate::pipeline::{
+    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp,
+};
 
 /// Seconds without detections before that is said.
 const SILENCE_S: u32 = 3;
@@ -70,6 +74,8 @@ pub struct Outputs {
     pub status: Output<EstimatorStatus>,
     /// Trusted poses as transforms, if wanted, with the name of the child frame.
     pub transform: Option<(Output<TFMessage>, String)>,
+    /// What can be drawn of a frame, if wanted.
+    pub markers: Option<Output<MarkerArray>>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
 }
@@ -77,10 +83,10 @@ pub struct Outputs {
 /// The pipeline between its messages.
 pub struct Estimator {
     pipeline: Pipeline,
+    reader: InputReader,
     outputs: Outputs,
     clock: NodeClock,
     node: String,
-    marker_map: String,
     camera: CameraState,
     tally: Tally,
     reporter: Reporter,
@@ -101,16 +107,17 @@ impl Estimator {
     #[must_use]
     pub fn new(
         pipeline: Pipeline,
+        reader: InputReader,
         outputs: Outputs,
         clock: NodeClock,
-        (node, marker_map): (&str, &str),
+        node: &str,
     ) -> Self {
         Self {
             pipeline,
+            reader,
             outputs,
             clock,
             node: node.to_owned(),
-            marker_map: marker_map.to_owned(),
             camera: CameraState::Missing,
             tally: Tally::default(),
             reporter: Reporter::default(),
@@ -139,22 +146,46 @@ impl Estimator {
     }
 
     /// Takes the detections of an image; publishes what becomes of them.
-    pub fn on_feature_points(&mut self, message: FeaturePointArray) {
+    pub fn on_detections(&mut self, message: InputMessage) {
         let begin = Instant::now();
-        let frame = convert::detection_frame(&message);
-        let outcome = self.pipeline.process(&frame);
+        let sighting = self.reader.read(message);
+        let header = sighting.header;
+        let (frame, outcome) = self.outcome(&header, sighting.detections);
         let solve_time = begin.elapsed();
 
-        let header = message.header;
         if let Ok(solution) = &outcome.result {
             self.outputs
                 .pose
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);
             self.publish_transform(&header, solution);
         }
-        let status = convert::status(header, &outcome, solve_time);
+        self.publish_markers(&header, &frame, &outcome);
+        let mut status = convert::status(header, &outcome, solve_time);
+        status.rejected_ids.extend(sighting.ignored_ids);
         self.take_note(outcome.code(), &status.message, frame.stamp, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
+    }
+
+    /// Returns the detections as a frame, and what becomes of it; without detections their refusal.
+    fn outcome(
+        &mut self,
+        header: &Header,
+        detections: Result<Vec<Detection>, Refusal>,
+    ) -> (DetectionFrame, FrameOutcome) {
+        let (detections, refusal) = match detections {
+            Ok(detections) => (detections, None),
+            Err(refusal) => (Vec::new(), Some(refusal)),
+        };
+        let frame = DetectionFrame {
+            stamp: header.stamp.into(),
+            frame_id: header.frame_id.clone(),
+            detections,
+        };
+        let outcome = match refusal {
+            Some(refusal) => FrameOutcome::refused(refusal),
+            None => self.pipeline.process(&frame),
+        };
+        (frame, outcome)
     }
 
     /// Takes changed settings, for the next frame on.
@@ -172,12 +203,13 @@ impl Estimator {
         }
     }
 
-    /// Publishes the diagnostics; `publishers`: of `feature_points`, in the graph.
+    /// Publishes the diagnostics; `publishers`: of the input, in the graph.
     pub fn on_second(&mut self, publishers: usize, now: Instant) {
         let situation = Situation {
             now: self.clock.now(),
             node: &self.node,
-            marker_map: &self.marker_map,
+            input: self.reader.input.topic(),
+            marker_map: self.reader.map.name(),
             camera: &self.camera,
             last_refusal: self.last_refusal.as_deref(),
             publishers,
@@ -209,6 +241,20 @@ impl Estimator {
             convert::transform(header.clone(), child, solution),
             &mut self.tally,
         );
+    }
+
+    /// Publishes what can be drawn; of a refused frame only the camera, if it is that of the frame.
+    fn publish_markers(&mut self, header: &Header, frame: &DetectionFrame, outcome: &FrameOutcome) {
+        let Some(output) = &mut self.outputs.markers else {
+            return;
+        };
+        let picture = match self.pipeline.camera() {
+            Some((frame_id, Ok(camera))) if frame_id == header.frame_id => {
+                Picture::new(camera, &self.reader.map, &frame.detections, outcome)
+            }
+            _ => Picture::default(),
+        };
+        output.publish(convert::markers(header, &picture), &mut self.tally);
     }
 
     fn note_camera(&mut self) {
@@ -262,10 +308,11 @@ impl Estimator {
 
     /// Says when detections do not come, after a while, and when they do.
     fn watch_silence(&mut self, arrived: bool, publishers: usize, now: Instant) {
+        let topic = self.reader.input.topic();
         if arrived {
             self.silent_seconds = 0;
             if self.silence.good().is_some() {
-                log::info!("feature_points arrive");
+                log::info!("{topic} arrive");
             }
             return;
         }
@@ -275,12 +322,12 @@ impl Estimator {
             return;
         }
         match (ever, publishers) {
-            (false, 0) => log::info!("waiting for feature_points: nobody publishes them yet"),
+            (false, 0) => log::info!("waiting for {topic}: nobody publishes them yet"),
             (false, n) => log::warn!(
-                "feature_points have {n} publisher(s), but nothing has arrived: check QoS and network"
+                "{topic} have {n} publisher(s), but nothing has arrived: check QoS and network"
             ),
-            (true, 0) => log::warn!("feature_points have stopped: their publisher is gone"),
-            (true, n) => log::warn!("feature_points have stopped, though {n} publisher(s) exist"),
+            (true, 0) => log::warn!("{topic} have stopped: their publisher is gone"),
+            (true, n) => log::warn!("{topic} have stopped, though {n} publisher(s) exist"),
         }
     }
 }

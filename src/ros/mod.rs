@@ -7,7 +7,7 @@
 //! clock                              the node's time, the system's or a simulation's
 //! participant, leave                 into the graph, and out of it
 //! service, rtps                      services, and what of the wire protocol is written here
-//! messages, convert                  the wire <-> plain types
+//! messages, convert, input           the wire <-> plain types
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
 //! node                               all of it together, until a signal or a tool ends it
@@ -21,6 +21,7 @@ pub mod convert;
 pub mod diagnostics;
 pub mod environment;
 pub mod estimator;
+pub mod input;
 pub mod leave;
 pub mod logging;
 pub mod messages;

@@ -6,17 +6,21 @@ use std::time::{Duration, Instant};
 
 use async_signal::{Signal, Signals};
 use futures::{FutureExt, StreamExt, pin_mut, select_biased};
-use ros2_client::{NodeOptions, Subscription};
+use ros2_client::NodeOptions;
 
 use super::arguments::Arguments;
 use super::clock::{NodeClock, SimTime};
 use super::environment::Environment;
 use super::estimator::{Estimator, Output, Outputs};
+pub use super::input::{DETECTIONS, FEATURE_POINTS};
+use super::input::{InputReader, InputSubscription};
 use super::logging;
-use super::messages::{CameraInfo, FeaturePointArray, Message};
+use super::messages::{CameraInfo, Message};
 use super::names::{NamesError, NodeNames};
 use super::parameters::{ParameterServices, SharedParameters};
-use super::participant::{EndpointError, OpenError, QosProfile, RosNode, reliable, sensor_data};
+use super::participant::{
+    EndpointError, OpenError, QosProfile, RosNode, Subscription, reliable, sensor_data,
+};
 use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::start_values::{StartParameterError, start_values};
 use crate::config::Configuration;
@@ -26,14 +30,14 @@ use crate::target::{MarkerMap, MarkerMapError};
 /// What the node is called unless it is remapped.
 pub const NODE_NAME: &str = "tanker_pose";
 
-/// Input: the detections of an image.
-pub const FEATURE_POINTS: &str = "feature_points";
-/// Input: the camera that took it.
+/// Input: the camera that took the images.
 pub const CAMERA_INFO: &str = "camera_info";
 /// Output: trusted poses.
 pub const POSE: &str = "pose";
 /// Output: what became of every image.
 pub const STATUS: &str = "status";
+/// Output: what can be drawn of it.
+pub const MARKERS: &str = "markers";
 
 /// Samples that wait for the node: enough for a hiccup, too few to lag behind.
 const INPUT: QosProfile = sensor_data(10);
@@ -129,7 +133,7 @@ pub fn run_until(
             ))
         })
         .map(|(mut service, parameter_services)| {
-            introduce(&ros, environment, &map, configuration.publish_tf);
+            introduce(&ros, environment, &map, &configuration);
             warn_of_too_small_map(&configuration, &map);
             let update = || Configuration::from(&parameters.snapshot());
             smol::block_on(service.serve(&mut ros, stop, changes, update, &mut sim_time));
@@ -149,9 +153,11 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
     let endpoint = |topic, role, qos| Ok(Endpoint::new(names.topic(topic)?, role, qos));
     [
         (FEATURE_POINTS, Role::Subscription, &INPUT),
+        (DETECTIONS, Role::Subscription, &INPUT),
         (CAMERA_INFO, Role::Subscription, &INPUT),
         (POSE, Role::Publisher, &OUTPUT),
         (STATUS, Role::Publisher, &OUTPUT),
+        (MARKERS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
         ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
     ]
@@ -185,7 +191,12 @@ fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
     }
 }
 
-fn introduce(ros: &RosNode, environment: &Environment, map: &MarkerMap, publish_tf: bool) {
+fn introduce(
+    ros: &RosNode,
+    environment: &Environment,
+    map: &MarkerMap,
+    configuration: &Configuration,
+) {
     let names = ros.names();
     let topic = |name: &str| names.topic(name).unwrap_or_default();
     log::info!(
@@ -195,26 +206,32 @@ fn introduce(ros: &RosNode, environment: &Environment, map: &MarkerMap, publish_
         map.name(),
         map.markers().len(),
     );
+    let optional = [
+        (configuration.publish_tf, "/tf"),
+        (configuration.publish_markers, MARKERS),
+    ];
     log::info!(
         "listening to {} and {}, publishing {}, {}, {}{}",
-        topic(FEATURE_POINTS),
+        topic(configuration.input.topic()),
         topic(CAMERA_INFO),
         topic(POSE),
         topic(STATUS),
         topic("/diagnostics"),
-        if publish_tf {
-            format!(", {}", topic("/tf"))
-        } else {
-            String::new()
-        },
+        optional
+            .into_iter()
+            .filter(|(wanted, _)| *wanted)
+            .map(|(_, name)| format!(", {}", topic(name)))
+            .collect::<String>(),
     );
 }
 
 /// The open topics, and the estimator between them.
 struct Service {
-    feature_points: Subscription<FeaturePointArray>,
+    detections: InputSubscription,
     camera_info: Subscription<CameraInfo>,
     estimator: Estimator,
+    /// That of the detections.
+    topic: &'static str,
 }
 
 impl Service {
@@ -234,19 +251,31 @@ impl Service {
             pose: output(ros, POSE, &OUTPUT)?,
             status: output(ros, STATUS, &OUTPUT)?,
             transform,
+            markers: match configuration.publish_markers {
+                true => Some(output(ros, MARKERS, &OUTPUT)?),
+                false => None,
+            },
             diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
+        };
+        let input = configuration.input;
+        let reader = InputReader {
+            input,
+            map: Arc::clone(map),
+            max_hamming: configuration.max_hamming,
         };
         let pipeline = Pipeline::new(configuration.settings.clone(), Arc::clone(map));
         Ok(Self {
             // Inputs last: what arrives can be answered.
             camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
-            feature_points: ros.subscription(FEATURE_POINTS, &INPUT)?,
+            detections: InputSubscription::open(ros, input, &INPUT)?,
             estimator: Estimator::new(
                 pipeline,
+                reader,
                 outputs,
                 clock.clone(),
-                (ros.names().base_name(), map.name()),
+                ros.names().base_name(),
             ),
+            topic: input.topic(),
         })
     }
 
@@ -261,10 +290,10 @@ impl Service {
     ) {
         let estimator = &mut self.estimator;
         let camera_infos = self.camera_info.async_stream();
-        let feature_points = self.feature_points.async_stream();
+        let (detections, topic) = (self.detections.stream(), self.topic);
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
         let (stop, changes) = (stop.fuse(), changes.fuse());
-        pin_mut!(camera_infos, feature_points, seconds, changes, stop);
+        pin_mut!(camera_infos, detections, seconds, changes, stop);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
@@ -282,12 +311,12 @@ impl Service {
                     Err(error) => estimator.on_undecodable(CAMERA_INFO, &error),
                 },
                 _ = seconds.select_next_some() => {
-                    let publishers = ros.publisher_count(FEATURE_POINTS).unwrap_or(0);
+                    let publishers = ros.publisher_count(topic).unwrap_or(0);
                     estimator.on_second(publishers, Instant::now());
                 },
-                sample = feature_points.select_next_some() => match sample {
-                    Ok((message, _)) => estimator.on_feature_points(message),
-                    Err(error) => estimator.on_undecodable(FEATURE_POINTS, &error),
+                sample = detections.select_next_some() => match sample {
+                    Ok(message) => estimator.on_detections(message),
+                    Err(error) => estimator.on_undecodable(topic, &error),
                 },
             }
         }

@@ -1,15 +1,21 @@
 //! Messages <-> plain types. Nothing is checked and nothing rounded: stamps pass as their two fields.
 
+mod apriltags;
+mod markers;
 mod tools;
+mod vision;
 
 use std::time::Duration;
 
 use super::messages::{self, EstimatorStatus, Header, Time};
 use crate::camera;
 use crate::estimation::{Initialisation, Solution};
-use crate::pipeline::{Detection, DetectionFrame, FrameOutcome, Stamp};
+use crate::pipeline::{Detection, FrameOutcome, Stamp};
 
+pub use apriltags::{TagDetections, tag_detections};
+pub use markers::markers;
 pub use tools::{camera_info_message, feature_points_message, isometry, pose_message};
+pub use vision::vision_detections;
 
 impl From<Time> for Stamp {
     fn from(time: Time) -> Self {
@@ -31,18 +37,14 @@ impl From<Stamp> for Time {
 
 /// Returns the detections of a message.
 #[must_use]
-pub fn detection_frame(message: &messages::FeaturePointArray) -> DetectionFrame {
+pub fn detections(message: &messages::FeaturePointArray) -> Vec<Detection> {
     let detection = |point: &messages::FeaturePoint| Detection {
         id: point.id,
         u_px: point.u,
         v_px: point.v,
         sigma_px: point.sigma,
     };
-    DetectionFrame {
-        stamp: message.header.stamp.into(),
-        frame_id: message.header.frame_id.clone(),
-        detections: message.points.iter().map(detection).collect(),
-    }
+    message.points.iter().map(detection).collect()
 }
 
 /// Returns the camera info of a message, without its header.

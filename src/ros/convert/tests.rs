@@ -43,7 +43,7 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
 }
 
 #[test]
-fn stamp_and_frame_pass_bit_for_bit() {
+fn stamp_and_pixels_pass_bit_for_bit() {
     let message = messages::FeaturePointArray {
         header: header(),
         points: vec![messages::FeaturePoint {
@@ -53,12 +53,16 @@ fn stamp_and_frame_pass_bit_for_bit() {
             sigma: 0.1,
         }],
     };
-    let frame = detection_frame(&message);
-    assert_eq!(Time::from(frame.stamp), message.header.stamp);
-    assert_eq!(frame.frame_id, message.header.frame_id);
-    assert_eq!(frame.detections[0].id, 9);
-    assert_eq!(frame.detections[0].u_px.to_bits(), f64::NAN.to_bits());
-    assert_eq!(frame.detections[0].v_px.to_bits(), (-0.0f64).to_bits());
+    let [seen] = detections(&message)[..] else {
+        panic!("one point is one detection")
+    };
+    assert_eq!(
+        Time::from(Stamp::from(message.header.stamp)),
+        message.header.stamp
+    );
+    assert_eq!(seen.id, 9);
+    assert_eq!(seen.u_px.to_bits(), f64::NAN.to_bits());
+    assert_eq!(seen.v_px.to_bits(), (-0.0f64).to_bits());
 }
 
 #[test]

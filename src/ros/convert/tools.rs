@@ -88,7 +88,7 @@ pub fn isometry(pose: &messages::Pose) -> Option<Isometry3<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{camera_info, detection_frame};
+    use super::super::{self as convert, camera_info};
     use super::*;
     use crate::simulation::paper_scene;
 
@@ -122,7 +122,7 @@ mod tests {
             sigma_px: 0.5,
         }];
         let sent = feature_points_message(Header::default(), &detections);
-        assert_eq!(detection_frame(&sent).detections, detections);
+        assert_eq!(convert::detections(&sent), detections);
 
         let scene = paper_scene();
         let truth = scene.truth_camera_from_tanker();

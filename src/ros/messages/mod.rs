@@ -6,13 +6,17 @@
 
 use serde::{Deserialize, Serialize};
 
+mod detectors;
 mod estimator_status;
 mod parameters;
 mod standard;
+mod visualization;
 
+pub use detectors::*;
 pub use estimator_status::EstimatorStatus;
 pub use parameters::*;
 pub use standard::*;
+pub use visualization::*;
 
 /// A message type's place in the ROS type system: `package/msg/name`.
 pub trait Message: Serialize + for<'de> Deserialize<'de> + 'static {
@@ -61,6 +65,9 @@ ros_message!(
     "diagnostic_msgs" / DiagnosticArray,
     "rcl_interfaces" / ParameterEvent,
     "rosgraph_msgs" / Clock,
+    "visualization_msgs" / MarkerArray,
+    "vision_msgs" / Detection2DArray,
+    "apriltag_msgs" / AprilTagDetectionArray,
     "tanker_pose" / FeaturePointArray,
     "tanker_pose" / EstimatorStatus,
 );

@@ -1,0 +1,138 @@
+//! Where detections come from: one topic, of one of three types, and what its messages say.
+
+use std::pin::Pin;
+use std::sync::Arc;
+
+use futures::StreamExt;
+use futures::stream::FusedStream;
+use ros2_client::{ReadError, Subscription};
+
+use super::convert;
+use super::messages::{AprilTagDetectionArray, Detection2DArray, FeaturePointArray, Header};
+use super::participant::{EndpointError, QosProfile, RosNode};
+use crate::config::Input;
+use crate::pipeline::{Detection, Refusal};
+use crate::target::MarkerMap;
+
+/// Input: the detections of an image, in our own message.
+pub const FEATURE_POINTS: &str = "feature_points";
+/// Input: the detections of an image, in those of others.
+pub const DETECTIONS: &str = "detections";
+
+impl Input {
+    /// Returns the name of its topic.
+    #[must_use]
+    pub const fn topic(self) -> &'static str {
+        match self {
+            Self::FeaturePoints => FEATURE_POINTS,
+            Self::Detections | Self::AprilTags => DETECTIONS,
+        }
+    }
+}
+
+/// The detections of an image, as one of the detectors publishes them.
+#[derive(Debug)]
+pub enum InputMessage {
+    /// `tanker_pose/FeaturePointArray`.
+    FeaturePoints(FeaturePointArray),
+    /// `vision_msgs/Detection2DArray`.
+    Detections(Detection2DArray),
+    /// `apriltag_msgs/AprilTagDetectionArray`.
+    AprilTags(AprilTagDetectionArray),
+}
+
+/// The topic that detections come from.
+pub enum InputSubscription {
+    /// `tanker_pose/FeaturePointArray`.
+    FeaturePoints(Subscription<FeaturePointArray>),
+    /// `vision_msgs/Detection2DArray`.
+    Detections(Subscription<Detection2DArray>),
+    /// `apriltag_msgs/AprilTagDetectionArray`.
+    AprilTags(Subscription<AprilTagDetectionArray>),
+}
+
+/// The messages of an input, in order.
+pub type InputStream<'a> = Pin<Box<dyn FusedStream<Item = Result<InputMessage, ReadError>> + 'a>>;
+
+impl InputSubscription {
+    /// Returns the subscription to the input's topic.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the name is malformed or the middleware refuses.
+    pub fn open(ros: &mut RosNode, input: Input, qos: &QosProfile) -> Result<Self, EndpointError> {
+        let topic = input.topic();
+        Ok(match input {
+            Input::FeaturePoints => Self::FeaturePoints(ros.subscription(topic, qos)?),
+            Input::Detections => Self::Detections(ros.subscription(topic, qos)?),
+            Input::AprilTags => Self::AprilTags(ros.subscription(topic, qos)?),
+        })
+    }
+
+    /// Returns its messages.
+    #[must_use]
+    pub fn stream(&self) -> InputStream<'_> {
+        match self {
+            Self::FeaturePoints(subscription) => {
+                let samples = subscription.async_stream();
+                Box::pin(samples.map(|sample| Ok(InputMessage::FeaturePoints(sample?.0))))
+            }
+            Self::Detections(subscription) => {
+                let samples = subscription.async_stream();
+                Box::pin(samples.map(|sample| Ok(InputMessage::Detections(sample?.0))))
+            }
+            Self::AprilTags(subscription) => {
+                let samples = subscription.async_stream();
+                Box::pin(samples.map(|sample| Ok(InputMessage::AprilTags(sample?.0))))
+            }
+        }
+    }
+}
+
+/// What one message says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// Time of the image and the camera's optical frame.
+    pub header: Header,
+    /// The detections, unchecked, or why they cannot be told.
+    pub detections: Result<Vec<Detection>, Refusal>,
+    /// Ids of points that were left out before any estimate.
+    pub ignored_ids: Vec<u32>,
+}
+
+/// Reads the messages of an input.
+pub struct InputReader {
+    /// Which input.
+    pub input: Input,
+    /// The map that tells which tags have corners.
+    pub map: Arc<MarkerMap>,
+    /// Tags with more corrected bits than this are left out.
+    pub max_hamming: i32,
+}
+
+impl InputReader {
+    /// Returns what a message says.
+    #[must_use]
+    pub fn read(&self, message: InputMessage) -> Sighting {
+        let (header, detections, ignored_ids) = match message {
+            InputMessage::FeaturePoints(message) => {
+                let detections = convert::detections(&message);
+                (message.header, Ok(detections), Vec::new())
+            }
+            InputMessage::Detections(message) => {
+                let detections = convert::vision_detections(&message);
+                (message.header, detections, Vec::new())
+            }
+            InputMessage::AprilTags(message) => {
+                match convert::tag_detections(&message, &self.map, self.max_hamming) {
+                    Ok(tags) => (message.header, Ok(tags.detections), tags.ignored_ids),
+                    Err(refusal) => (message.header, Err(refusal), Vec::new()),
+                }
+            }
+        };
+        Sighting {
+            header,
+            detections,
+            ignored_ids,
+        }
+    }
+}
