@@ -184,6 +184,16 @@ tags:
     }
 
     #[test]
+    fn the_example_that_comes_with_the_program_is_a_map() {
+        let text = include_str!("../../config/tankers/tags_example.yaml");
+        let map = MarkerMap::from_yaml(text, "tags_example.yaml").expect("a sound example");
+        assert_eq!((map.name(), map.markers().len()), ("tags_example", 13));
+        // Upright and facing aft: the first corner is at the bottom left for who looks from behind.
+        let corner = map.get(0).expect("the first corner of tag 0");
+        assert!((corner - Point3::new(3.6, -6.2, 0.3)).norm() < 1e-12, "{corner}");
+    }
+
+    #[test]
     fn tags_and_single_markers_go_together() {
         let text = format!("{GOOD}markers:\n  - {{id: 8, x: 0, y: 0, z: 0}}\n");
         let map = MarkerMap::from_yaml(&text, "m.yaml").expect("five points");

@@ -20,7 +20,7 @@ os.environ["FASTDDS_DEFAULT_PROFILES_FILE"] = str(
 os.environ["RMW_FASTRTPS_USE_QOS_FROM_XML"] = "1"
 
 from harness.domains import claimed_domain  # noqa: E402
-from harness.estimator import Estimator, Topics  # noqa: E402
+from harness.estimator import FEATURE_POINTS, Estimator, Topics  # noqa: E402
 from harness.peer import BEST_EFFORT, Peer  # noqa: E402
 from harness.processes import Process, binary  # noqa: E402
 
@@ -71,8 +71,10 @@ def start_node(domain: int, tmp_path: Path) -> Iterator[StartNode]:
 def start_estimator(start_node: StartNode, peer: Peer) -> StartEstimator:
     """Starts the node, wires the peer to it and waits until they hear each other."""
 
-    def start(*ros_arguments: str, topics: Topics = Topics(), qos=BEST_EFFORT) -> Estimator:
-        estimator = Estimator(peer, start_node(*ros_arguments), topics, qos)
+    def start(
+        *ros_arguments: str, topics: Topics = Topics(), qos=BEST_EFFORT, detector=FEATURE_POINTS
+    ) -> Estimator:
+        estimator = Estimator(peer, start_node(*ros_arguments), topics, qos, detector)
         estimator.wait_until_heard()
         return estimator
 

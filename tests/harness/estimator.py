@@ -3,10 +3,12 @@
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
 from tanker_pose.msg import EstimatorStatus, FeaturePointArray
 
 from harness import messages
@@ -30,6 +32,17 @@ OUTCOMES: dict[int, str] = {
 def outcome_name(value: int) -> str:
     """The name of an outcome constant, for failures that people can read."""
     return OUTCOMES.get(value, f"unknown outcome {value}")
+
+
+@dataclass(frozen=True)
+class Detector:
+    """What brings the detections: messages of a type, on a topic."""
+
+    message_type: type
+    topic: str
+
+
+FEATURE_POINTS = Detector(FeaturePointArray, "/feature_points")
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,12 @@ class Estimator:
     """A running node, heard and hearing."""
 
     def __init__(
-        self, peer: Peer, process: Process, topics: Topics = Topics(), qos: QoSProfile = BEST_EFFORT
+        self,
+        peer: Peer,
+        process: Process,
+        topics: Topics = Topics(),
+        qos: QoSProfile = BEST_EFFORT,
+        detector: Detector = FEATURE_POINTS,
     ) -> None:
         self.peer = peer
         self.process = process
@@ -76,7 +94,9 @@ class Estimator:
         node.create_subscription(PoseWithCovarianceStamped, topics.pose, self._on_pose, RELIABLE)
         node.create_subscription(EstimatorStatus, topics.status, self._on_status, RELIABLE)
         self.info_publisher = node.create_publisher(CameraInfo, topics.camera_info, qos)
-        self.points_publisher = node.create_publisher(FeaturePointArray, topics.feature_points, qos)
+        self._detector = detector
+        topic = topics.feature_points if detector is FEATURE_POINTS else detector.topic
+        self.points_publisher = node.create_publisher(detector.message_type, topic, qos)
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         self.poses.setdefault(key(message.header.stamp), []).append(message)
@@ -116,7 +136,8 @@ class Estimator:
         def probe() -> None:
             before()
             # No node can give a pose for it, whatever its marker map, so it leaves no trace.
-            frame = messages.feature_points(next(self._probes), [], ids=[], frame_id="probe")
+            header = Header(stamp=messages.stamp_of(next(self._probes)), frame_id="probe")
+            frame = self._detector.message_type(header=header)
             stamps.append(key(frame.header.stamp))
             self.points_publisher.publish(frame)
             self.peer.spin_for(_PROBE_PERIOD_S)
@@ -129,11 +150,11 @@ class Estimator:
 
         wait_until(answered, what, pause=probe)
 
-    def send(self, frame: FeaturePointArray) -> None:
+    def send(self, frame: Any) -> None:
         """Publishes a frame without waiting for the answer."""
         self.points_publisher.publish(frame)
 
-    def answer_to(self, frame: FeaturePointArray) -> Answer:
+    def answer_to(self, frame: Any) -> Answer:
         """The latest answer to a frame sent before; with its pose when the status promises one."""
         stamp = key(frame.header.stamp)
         self.peer.spin_until(lambda: stamp in self.statuses, f"a status for frame {stamp}")
@@ -142,14 +163,14 @@ class Estimator:
             self.peer.spin_until(lambda: stamp in self.poses, f"a pose for frame {stamp}")
         return Answer(status, self.pose_for(frame))
 
-    def ask(self, frame: FeaturePointArray) -> Answer:
+    def ask(self, frame: Any) -> Answer:
         """Sends a frame and returns the answer."""
         self.send(frame)
         return self.answer_to(frame)
 
     def ask_until(
         self,
-        make_frame: Callable[[int], FeaturePointArray],
+        make_frame: Callable[[int], Any],
         accept: Callable[[Answer], bool],
         what: str,
     ) -> Answer:
@@ -166,12 +187,12 @@ class Estimator:
         wait_until(lambda: accept(answers[-1]), what, pause=ask_again)
         return answers[-1]
 
-    def pose_for(self, frame: FeaturePointArray) -> PoseWithCovarianceStamped | None:
+    def pose_for(self, frame: Any) -> PoseWithCovarianceStamped | None:
         """The pose received so far with the frame's stamp."""
         poses = self.poses.get(key(frame.header.stamp), [])
         return poses[-1] if poses else None
 
-    def expect_pose(self, frame: FeaturePointArray) -> Answer:
+    def expect_pose(self, frame: Any) -> Answer:
         """Sends a frame that must be answered with a pose."""
         answer = self.ask(frame)
         assert answer.outcome == "OK", f"{answer.outcome}: {answer.status.message}"
@@ -180,9 +201,9 @@ class Estimator:
 
     def expect_refusal(
         self,
-        frame: FeaturePointArray,
+        frame: Any,
         outcome: str,
-        good_frame: Callable[[int], FeaturePointArray] | None = messages.exact_frame,
+        good_frame: Callable[[int], Any] | None = messages.exact_frame,
     ) -> Answer:
         """Sends a frame that must be refused with `outcome` and words, without ending the service.
 
