@@ -19,7 +19,7 @@ pub struct Configuration {
     pub publish_tf: bool,
     /// Whether time comes from /clock.
     pub use_sim_time: bool,
-    /// Whether to publish what RViz and Foxglove can draw.
+    /// Whether to publish what `RViz` and Foxglove can draw.
     pub publish_markers: bool,
     /// Where detections come from.
     pub input: Input,

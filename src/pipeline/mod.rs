@@ -163,14 +163,23 @@ impl Pipeline {
         outcome
     }
 
-    fn observations(&self, frame: &DetectionFrame) -> Result<(&Camera, Vec<Observation>), Refusal> {
-        checks::check_stamp(frame.stamp)?;
+    /// Returns the camera of a frame with this header.
+    ///
+    /// # Errors
+    /// [`Refusal`] when the stamp is none, there is no camera, or not this one: what [`Self::process`] asks first.
+    pub fn camera_for(&self, stamp: Stamp, frame_id: &str) -> Result<&Camera, Refusal> {
+        checks::check_stamp(stamp)?;
         let latched = self.camera.as_ref().ok_or(Refusal::NoCameraInfo)?;
         let camera = latched
             .camera
             .as_ref()
             .map_err(|cause| Refusal::InvalidCameraInfo(cause.clone()))?;
-        checks::check_frame_id(&latched.frame_id, &frame.frame_id)?;
+        checks::check_frame_id(&latched.frame_id, frame_id)?;
+        Ok(camera)
+    }
+
+    fn observations(&self, frame: &DetectionFrame) -> Result<(&Camera, Vec<Observation>), Refusal> {
+        let camera = self.camera_for(frame.stamp, &frame.frame_id)?;
         let observations = observe(
             camera,
             &frame.detections,

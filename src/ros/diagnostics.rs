@@ -154,7 +154,7 @@ fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u
     if frames == 0 {
         let message = match situation.publishers {
             0 => format!("no {input}: no publisher"),
-            n => format!("no {input}, though {n} publisher(s) exist: check QoS and network"),
+            n => format!("no {input}, though {n} publisher(s) exist: check type, QoS and network"),
         };
         (DiagnosticStatus::STALE, message)
     } else if estimates == 0 {

@@ -182,7 +182,13 @@ impl Estimator {
             detections,
         };
         let outcome = match refusal {
-            Some(refusal) => FrameOutcome::refused(refusal),
+            // The header first, as for every frame.
+            Some(refusal) => FrameOutcome::refused(
+                self.pipeline
+                    .camera_for(frame.stamp, &frame.frame_id)
+                    .err()
+                    .unwrap_or(refusal),
+            ),
             None => self.pipeline.process(&frame),
         };
         (frame, outcome)
@@ -248,12 +254,11 @@ impl Estimator {
         let Some(output) = &mut self.outputs.markers else {
             return;
         };
-        let picture = match self.pipeline.camera() {
-            Some((frame_id, Ok(camera))) if frame_id == header.frame_id => {
-                Picture::new(camera, &self.reader.map, &frame.detections, outcome)
-            }
-            _ => Picture::default(),
-        };
+        let picture = self
+            .pipeline
+            .camera_for(frame.stamp, &frame.frame_id)
+            .map(|camera| Picture::new(camera, &self.reader.map, &frame.detections, outcome))
+            .unwrap_or_default();
         output.publish(convert::markers(header, &picture), &mut self.tally);
     }
 
@@ -324,7 +329,7 @@ impl Estimator {
         match (ever, publishers) {
             (false, 0) => log::info!("waiting for {topic}: nobody publishes them yet"),
             (false, n) => log::warn!(
-                "{topic} have {n} publisher(s), but nothing has arrived: check QoS and network"
+                "{topic} have {n} publisher(s), but nothing has arrived: check type, QoS and network"
             ),
             (true, 0) => log::warn!("{topic} have stopped: their publisher is gone"),
             (true, n) => log::warn!("{topic} have stopped, though {n} publisher(s) exist"),

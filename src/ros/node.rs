@@ -210,18 +210,16 @@ fn introduce(
         (configuration.publish_tf, "/tf"),
         (configuration.publish_markers, MARKERS),
     ];
+    let published: Vec<String> = [POSE, STATUS, "/diagnostics"]
+        .into_iter()
+        .chain(optional.iter().filter(|(on, _)| *on).map(|(_, name)| *name))
+        .map(topic)
+        .collect();
     log::info!(
-        "listening to {} and {}, publishing {}, {}, {}{}",
+        "listening to {} and {}, publishing {}",
         topic(configuration.input.topic()),
         topic(CAMERA_INFO),
-        topic(POSE),
-        topic(STATUS),
-        topic("/diagnostics"),
-        optional
-            .into_iter()
-            .filter(|(wanted, _)| *wanted)
-            .map(|(_, name)| format!(", {}", topic(name)))
-            .collect::<String>(),
+        published.join(", "),
     );
 }
 
@@ -247,14 +245,16 @@ impl Service {
         } else {
             None
         };
+        let markers = if configuration.publish_markers {
+            Some(output(ros, MARKERS, &OUTPUT)?)
+        } else {
+            None
+        };
         let outputs = Outputs {
             pose: output(ros, POSE, &OUTPUT)?,
             status: output(ros, STATUS, &OUTPUT)?,
             transform,
-            markers: match configuration.publish_markers {
-                true => Some(output(ros, MARKERS, &OUTPUT)?),
-                false => None,
-            },
+            markers,
             diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
         };
         let input = configuration.input;

@@ -4,7 +4,7 @@ use crate::pipeline::{Detection, Refusal};
 use crate::ros::messages::{AprilTagDetection, AprilTagDetectionArray, Point2D};
 use crate::target::{MarkerMap, Tag};
 
-/// px; AprilTag's library counts from the corner of the top-left pixel, this program from its centre.
+/// px; the library of `AprilTag` counts from the corner of the top-left pixel, this program from its centre.
 const PIXEL_CENTRE_PX: f64 = 0.5;
 
 /// The usable points of a message.

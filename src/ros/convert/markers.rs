@@ -169,13 +169,9 @@ mod tests {
     #[test]
     fn everything_shown_before_is_removed_first_and_nothing_is_shown_for_nothing() {
         let found = markers(&header(), &Picture::default()).markers;
-        let [clear] = &found[..] else {
-            panic!("there is nothing to show: {found:?}")
-        };
-        assert_eq!(
-            (clear.action, &clear.header),
-            (Marker::DELETEALL, &header())
-        );
+        assert_eq!(found.len(), 1, "there is nothing to show");
+        assert_eq!(found[0].action, Marker::DELETEALL);
+        assert_eq!(found[0].header, header());
     }
 
     #[test]

@@ -53,9 +53,7 @@ fn stamp_and_pixels_pass_bit_for_bit() {
             sigma: 0.1,
         }],
     };
-    let [seen] = detections(&message)[..] else {
-        panic!("one point is one detection")
-    };
+    let seen = detections(&message)[0];
     assert_eq!(
         Time::from(Stamp::from(message.header.stamp)),
         message.header.stamp

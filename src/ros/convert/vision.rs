@@ -1,7 +1,7 @@
 //! `vision_msgs/Detection2DArray` -> detections: the centre of each box is a marker's pixel.
 
 use crate::pipeline::{Detection, Refusal};
-use crate::ros::messages::{Detection2D, Detection2DArray, Header, ObjectHypothesisWithPose};
+use crate::ros::messages::{Detection2D, Detection2DArray, Header, ObjectHypothesisWithPose, Time};
 
 /// Returns the detections of a message, all without a sigma of their own.
 ///
@@ -94,7 +94,7 @@ fn number(text: &str) -> Option<u32> {
 /// A detection's own header may be empty, or repeat that of its array.
 fn check_header(id: u32, array: &Header, own: &Header) -> Result<(), Refusal> {
     let same_frame = own.frame_id.is_empty() || own.frame_id == array.frame_id;
-    let same_stamp = own.stamp == Default::default() || own.stamp == array.stamp;
+    let same_stamp = own.stamp == Time::default() || own.stamp == array.stamp;
     if same_frame && same_stamp {
         return Ok(());
     }
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::pipeline::OutcomeCode;
     use crate::ros::messages::{
-        BoundingBox2D, ObjectHypothesis, Point2D, Pose, Pose2D, PoseWithCovariance, Time,
+        BoundingBox2D, ObjectHypothesis, Point2D, Pose, Pose2D, PoseWithCovariance,
     };
 
     fn hypothesis(class_id: &str, score: f64) -> ObjectHypothesisWithPose {

@@ -1,4 +1,4 @@
-//! `visualization_msgs`, for RViz and Foxglove.
+//! `visualization_msgs`, for `RViz` and Foxglove.
 
 use serde::{Deserialize, Serialize};
 
