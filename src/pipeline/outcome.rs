@@ -49,7 +49,7 @@ pub enum Refusal {
     },
     /// A tag of another family.
     #[error(
-        "expected tag {id} of family {}, got family {}",
+        "expected tag {id} of family {:?}, got family {:?}",
         clip(expected),
         clip(got)
     )]
@@ -184,10 +184,10 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// Returns a foreign word as messages show it, cut where it is long.
+    /// Returns a foreign word as messages show it: cut where it is long, without control characters.
     #[must_use]
     pub fn shown(word: &str) -> String {
-        clip(word)
+        clip(word).escape_debug().to_string()
     }
 }
 

@@ -116,6 +116,11 @@ def zero_stamp(frame: Detection2DArray) -> None:
     frame.header.stamp = Time()
 
 
+def nameless_and_unstamped(frame: Detection2DArray) -> None:
+    no_name(frame)
+    zero_stamp(frame)
+
+
 def other_frame(frame: Detection2DArray) -> None:
     frame.header.frame_id = "another_camera"
 
@@ -143,6 +148,7 @@ def box_of_another_time(frame: Detection2DArray) -> None:
         (far_pixel, "OUTSIDE_IMAGE"),
         (no_boxes, "TOO_FEW_POINTS"),
         (zero_stamp, "ZERO_STAMP"),
+        (nameless_and_unstamped, "ZERO_STAMP"),
         (other_frame, "FRAME_MISMATCH"),
         (box_of_another_camera, "FRAME_MISMATCH"),
         (box_of_another_time, "FRAME_MISMATCH"),
