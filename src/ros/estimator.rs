@@ -159,11 +159,12 @@ impl Estimator {
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);
             self.publish_transform(&header, solution);
         }
-        self.publish_markers(&header, &frame, &outcome);
-        let mut status = convert::status(header, &outcome, solve_time);
+        let mut status = convert::status(header.clone(), &outcome, solve_time);
         status.rejected_ids.extend(sighting.ignored_ids);
         self.take_note(outcome.code(), &status.message, frame.stamp, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
+        // Last: they are for people, who don't wait for a millisecond.
+        self.publish_markers(&header, &frame, &outcome);
     }
 
     /// Returns the detections as a frame, and what becomes of it; without detections their refusal.

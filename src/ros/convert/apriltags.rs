@@ -1,5 +1,7 @@
 //! `apriltag_msgs/AprilTagDetectionArray` -> detections: the corners of tags that stand in the marker map.
 
+use std::collections::BTreeSet;
+
 use crate::pipeline::{Detection, Refusal};
 use crate::ros::messages::{AprilTagDetection, AprilTagDetectionArray, Point2D};
 use crate::target::{MarkerMap, Tag};
@@ -12,7 +14,7 @@ const PIXEL_CENTRE_PX: f64 = 0.5;
 pub struct TagDetections {
     /// Four for each tag of the map, or its centre where the map has it as a single marker.
     pub detections: Vec<Detection>,
-    /// Points of tags that were left out for their hamming distance.
+    /// Points of tags that were left out for their hamming distance, ascending.
     pub ignored_ids: Vec<u32>,
 }
 
@@ -29,11 +31,12 @@ pub fn tag_detections(
 ) -> Result<TagDetections, Refusal> {
     let mut points = TagDetections::default();
     let mut unknown_ids = Vec::new();
+    let mut ignored_ids = BTreeSet::new();
     for seen in &message.detections {
         let known = u32::try_from(seen.id).ok().and_then(|id| known(id, map));
         if seen.hamming > max_hamming {
             let ids = known.iter().flat_map(|known| known.points(seen));
-            points.ignored_ids.extend(ids.map(|point| point.id));
+            ignored_ids.extend(ids.map(|point| point.id));
             continue;
         }
         let Some(known) = known else {
@@ -55,8 +58,8 @@ pub fn tag_detections(
         return Err(Refusal::UnknownTag { ids: unknown_ids });
     }
     // Seen twice, once well: it was not left out.
-    let used = |id: &u32| points.detections.iter().any(|point| point.id == *id);
-    points.ignored_ids.retain(|id| !used(id));
+    let used_ids = points.detections.iter().map(|point| point.id).collect();
+    points.ignored_ids = ignored_ids.difference(&used_ids).copied().collect();
     Ok(points)
 }
 
@@ -95,6 +98,7 @@ fn detection(id: u32, point: Point2D) -> Detection {
 mod tests {
     use super::*;
     use crate::pipeline::OutcomeCode;
+    use proptest::prelude::*;
 
     const MAP: &str = "name: tagged
 markers:
@@ -195,8 +199,10 @@ tags:
             hamming: 2,
             ..seen(7)
         };
-        let found = read(&[bad, seen(7)]).expect("known");
+        let found = read(&[bad.clone(), seen(7)]).expect("known");
         assert_eq!((found.detections.len(), found.ignored_ids.len()), (4, 0));
+        let found = read(&[bad.clone(), bad]).expect("known");
+        assert_eq!(found.ignored_ids, [70, 71, 72, 73], "each point once");
     }
 
     #[test]
@@ -205,5 +211,35 @@ tags:
         let mut bad = seen(7);
         bad.corners[2].x = f64::NAN;
         assert!(read(&[bad]).expect("known").detections[2].u_px.is_nan());
+    }
+
+    proptest! {
+        #[test]
+        fn every_message_is_read_or_refused_and_used_points_are_of_the_map(
+            seen in prop::collection::vec(
+                ("(tag)?(36h11|16h5|.{0,3})", -5..100, any::<i32>(), any::<f64>()),
+                0..8,
+            ),
+        ) {
+            let detections: Vec<_> = seen
+                .into_iter()
+                .map(|(family, id, hamming, x)| AprilTagDetection {
+                    family,
+                    id,
+                    hamming,
+                    centre: Point2D { x, y: x },
+                    corners: [Point2D { x, y: x }; 4],
+                    ..AprilTagDetection::default()
+                })
+                .collect();
+            let of_the_map = |id: &u32| [3, 70, 71, 72, 73].contains(id);
+            match read(&detections) {
+                Ok(points) => {
+                    prop_assert!(points.detections.iter().all(|point| of_the_map(&point.id)));
+                    prop_assert!(points.ignored_ids.iter().all(of_the_map));
+                }
+                Err(refusal) => prop_assert_eq!(refusal.code(), OutcomeCode::UnknownId),
+            }
+        }
     }
 }
