@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from apriltag_msgs.msg import AprilTagDetectionArray
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from scipy.stats import chi2
 from vision_msgs.msg import Detection2DArray
 
@@ -364,6 +365,10 @@ def test_an_input_that_is_none_is_refused(start_node: StartNode) -> None:
 def test_diagnostics_and_log_name_the_topic_of_the_input(
     start_node: StartNode, peer: Peer
 ) -> None:
+    received: list[DiagnosticArray] = peer.collect(DiagnosticArray, "/diagnostics")
     node = start_node("-p", "input:=apriltags")
 
+    peer.spin_until(lambda: bool(received), "diagnostics")
     peer.spin_until(lambda: "waiting for detections" in node.log, "a word of what is missing")
+
+    assert "no detections" in received[0].status[0].message
