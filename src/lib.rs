@@ -28,4 +28,5 @@ pub mod ros;
 pub mod simulation;
 pub mod target;
 mod text;
+pub mod tracking;
 pub mod yaml;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Vector6};
 
+use super::motion::congruent;
 use super::rotation::skew;
 
 /// Covariance of a pose `b_from_a`, in ROS's convention (`geometry_msgs/PoseWithCovariance`).
@@ -27,7 +28,7 @@ impl PoseCovariance {
         let mut q = Matrix6::zeros();
         q.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
         q.fixed_view_mut::<3, 3>(3, 3).copy_from(rotation.matrix());
-        Self(q * self.0 * q.transpose())
+        Self(congruent(&q, &self.0))
     }
 
     /// Returns `eᵀ Σ⁻¹ e`, the squared Mahalanobis distance of a pose error (NEES when the error is

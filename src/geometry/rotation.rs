@@ -40,6 +40,48 @@ pub fn cayley(w: Vector3<f64>) -> Rotation3<f64> {
     ))
 }
 
+/// rad; below it the series of the rotation's Jacobians are exact to machine precision.
+const SMALL_ANGLE: f64 = 1e-3;
+
+/// Returns the left Jacobian `J` of the rotation vector `w` (radians): `Exp(w + δ) = Exp(J δ) Exp(w)`
+/// to first order in `δ`.
+///
+/// # Source
+/// Sola, Deray, Atchuthan, *A micro Lie theory for state estimation in robotics*, Eq. (145).
+#[must_use]
+pub fn left_jacobian(w: Vector3<f64>) -> Matrix3<f64> {
+    let squared = w.norm_squared();
+    let angle = squared.sqrt();
+    let (a, b) = if angle < SMALL_ANGLE {
+        (0.5 - squared / 24.0, 1.0 / 6.0 - squared / 120.0)
+    } else {
+        (
+            (1.0 - angle.cos()) / squared,
+            (angle - angle.sin()) / (squared * angle),
+        )
+    };
+    let s = skew(w);
+    Matrix3::identity() + s * a + s * s * b
+}
+
+/// Returns the inverse of [`left_jacobian`], for less than a full turn.
+///
+/// # Source
+/// The same, Eq. (146).
+#[must_use]
+pub fn left_jacobian_inverse(w: Vector3<f64>) -> Matrix3<f64> {
+    let squared = w.norm_squared();
+    let angle = squared.sqrt();
+    let c = if angle < SMALL_ANGLE {
+        1.0 / 12.0 + squared / 720.0
+    } else {
+        // (1 + cos)/sin = cot(angle/2), which is finite at half a turn.
+        (1.0 - 0.5 * angle / (0.5 * angle).tan()) / squared
+    };
+    let s = skew(w);
+    Matrix3::identity() - s * 0.5 + s * s * c
+}
+
 /// Returns `Rz(yaw) Ry(pitch) Rx(roll)`, angles in radians.
 #[must_use]
 pub fn rotation_from_roll_pitch_yaw(roll: f64, pitch: f64, yaw: f64) -> Rotation3<f64> {
@@ -181,6 +223,27 @@ mod tests {
     fn cayley_agrees_with_exp_to_second_order() {
         let w = Vector3::new(1e-3, -2e-3, 3e-3);
         assert!((cayley(w).matrix() - Rotation3::new(w).matrix()).norm() < w.norm().powi(3));
+    }
+
+    #[test]
+    fn left_jacobian_is_the_derivative_of_exp() {
+        const STEP: f64 = 1e-6;
+        for w in [
+            Vector3::zeros(),
+            Vector3::new(4e-4, -5e-4, 7e-4),
+            Vector3::new(0.3, -0.2, 0.9),
+            Vector3::new(-1.9, 1.4, 1.6),
+        ] {
+            let jacobian = left_jacobian(w);
+            for axis in 0..3 {
+                let step = Vector3::ith(axis, STEP);
+                let moved = Rotation3::new(w + step) * Rotation3::new(w - step).inverse();
+                let difference = moved.scaled_axis() / (2.0 * STEP) - jacobian.column(axis);
+                assert!(difference.norm() < 1e-8, "{w}: {difference}");
+            }
+            let product = jacobian * left_jacobian_inverse(w);
+            assert!((product - Matrix3::identity()).norm() < ROUNDING, "{w}");
+        }
     }
 
     #[test]

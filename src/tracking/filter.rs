@@ -1,0 +1,265 @@
+//! The track: when it begins, what it believes, when it ends.
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::model::{Innovation, predict};
+use super::settings::Checked;
+use super::{
+    FilterSettings, FilterSettingsError, MeasurementError, PredictError, StartReason, TrackOutcome,
+};
+use crate::geometry::{Matrix12, Motion, PoseCovariance};
+
+/// The motion of the tanker in the camera at the time of one image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Track {
+    /// Time of the image, ns.
+    pub stamp_ns: i64,
+    /// `camera_from_tanker` with velocity, rate and covariance: `b` is the camera, `a` the tanker.
+    pub motion: Motion,
+}
+
+/// A track, or a candidate for one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct State {
+    track: Track,
+    consistent_frames: u32,
+    /// The latest stamp of any frame, accepted or not.
+    seen_ns: i64,
+}
+
+/// Turns poses of single frames into a track. It allocates nothing and reads no clock.
+///
+/// A frame that comes later than one with a younger stamp is not used: nothing is computed twice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filter {
+    settings: FilterSettings,
+    checked: Checked,
+    state: Option<State>,
+}
+
+impl Filter {
+    /// Returns a filter without a track.
+    ///
+    /// # Errors
+    /// [`FilterSettingsError`] names the first setting out of range.
+    pub fn new(settings: FilterSettings) -> Result<Self, FilterSettingsError> {
+        Ok(Self {
+            settings,
+            checked: settings.check()?,
+            state: None,
+        })
+    }
+
+    /// Returns the settings in force.
+    #[must_use]
+    pub fn settings(&self) -> &FilterSettings {
+        &self.settings
+    }
+
+    /// Forgets track and candidate; the next pose is the first.
+    pub fn reset(&mut self) {
+        self.state = None;
+    }
+
+    /// Returns the track at the last accepted frame; none while it is not confirmed.
+    #[must_use]
+    pub fn track(&self) -> Option<&Track> {
+        self.confirmed().map(|state| &state.track)
+    }
+
+    /// Returns the largest squared innovation that the gate accepts.
+    #[must_use]
+    pub fn gate_limit(&self) -> f64 {
+        self.checked.gate
+    }
+
+    /// Returns the motion expected at a stamp, with its covariance: a start for the next estimate.
+    ///
+    /// # Errors
+    /// [`PredictError`]: no track, a stamp before it, or one more than `max_gap_s` after it.
+    pub fn predict(&self, stamp_ns: i64) -> Result<Motion, PredictError> {
+        let state = self.confirmed().ok_or(PredictError::NoTrack)?;
+        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
+        if gap_s < 0.0 {
+            return Err(PredictError::BeforeTrack { by_s: -gap_s });
+        }
+        let limit_s = self.checked.max_gap_s;
+        if gap_s > limit_s {
+            return Err(PredictError::BeyondGap { gap_s, limit_s });
+        }
+        Ok(predict(&state.track.motion, gap_s, &self.checked.noise))
+    }
+
+    /// Returns how far a pose is from what the track expects at its stamp: the squared innovation over
+    /// its covariance, chi-squared with 6 degrees of freedom, to be held against [`Self::gate_limit`].
+    ///
+    /// Of two poses that fit an image alike, the one that the motion so far contradicts is found by this.
+    /// It changes nothing.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    pub fn innovation_squared(
+        &self,
+        stamp_ns: i64,
+        camera_from_tanker: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> Result<f64, PredictError> {
+        let predicted = self.predict(stamp_ns)?;
+        let noise = self.with_floor(covariance);
+        Ok(
+            Innovation::new(&predicted, camera_from_tanker, &noise)
+                .map_or(f64::INFINITY, |innovation| innovation.squared),
+        )
+    }
+
+    /// Takes the pose of one frame and returns what became of it.
+    ///
+    /// # Inputs
+    /// * `stamp_ns`: when the image was taken.
+    /// * `camera_from_tanker`, `covariance`: a trusted estimate, whose error is independent of those of
+    ///   other frames.
+    pub fn update(
+        &mut self,
+        stamp_ns: i64,
+        camera_from_tanker: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> TrackOutcome {
+        if let Err(error) = check(camera_from_tanker, covariance) {
+            return TrackOutcome::Invalid(error);
+        }
+        let measured = (stamp_ns, camera_from_tanker, self.with_floor(covariance));
+        let Some(state) = self.state.as_mut() else {
+            return self.start(&measured, StartReason::First);
+        };
+        let track = &state.track;
+        if stamp_ns == state.seen_ns || stamp_ns == track.stamp_ns {
+            return TrackOutcome::Duplicate { stamp_ns };
+        }
+        let gap_s = seconds(stamp_ns, track.stamp_ns);
+        if gap_s.abs() > self.checked.max_gap_s {
+            let reason = if gap_s > 0.0 {
+                StartReason::Gap { gap_s }
+            } else {
+                StartReason::StampsWentBack { by_s: -gap_s }
+            };
+            return self.start(&measured, reason);
+        }
+        if gap_s < 0.0 {
+            return TrackOutcome::Late { late_by_s: -gap_s };
+        }
+        state.seen_ns = state.seen_ns.max(stamp_ns);
+        let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
+        let predicted = predict(&track.motion, gap_s, &self.checked.noise);
+        let Some(innovation) = Innovation::new(&predicted, camera_from_tanker, &measured.2) else {
+            return self.start(&measured, StartReason::LostPrecision);
+        };
+        let (innovation_squared, limit) = (innovation.squared, self.checked.gate);
+        if innovation_squared > limit {
+            if is_confirmed {
+                return TrackOutcome::Gated {
+                    innovation_squared,
+                    limit,
+                };
+            }
+            let reason = StartReason::Inconsistent {
+                innovation_squared,
+                limit,
+            };
+            return self.start(&measured, reason);
+        }
+        let motion = innovation.corrected(&predicted);
+        if motion.covariance.cholesky().is_none() {
+            return self.start(&measured, StartReason::LostPrecision);
+        }
+        state.track = Track { stamp_ns, motion };
+        state.consistent_frames = state.consistent_frames.saturating_add(1);
+        let (consistent_frames, needed) = (state.consistent_frames, self.checked.confirm_frames);
+        if is_confirmed {
+            TrackOutcome::Updated { innovation_squared }
+        } else if consistent_frames >= needed {
+            TrackOutcome::Acquired
+        } else {
+            TrackOutcome::Confirming {
+                consistent_frames,
+                needed,
+            }
+        }
+    }
+
+    /// Tells the filter of a frame that gave no pose, and returns whether the track outlives it.
+    pub fn miss(&mut self, stamp_ns: i64) -> TrackOutcome {
+        let Some(state) = &self.state else {
+            return TrackOutcome::Idle;
+        };
+        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
+        if gap_s > self.checked.max_gap_s {
+            self.state = None;
+            return TrackOutcome::Dropped { gap_s };
+        }
+        if gap_s < 0.0 {
+            return TrackOutcome::Late { late_by_s: -gap_s };
+        }
+        TrackOutcome::Coasting { gap_s }
+    }
+
+    fn confirmed(&self) -> Option<&State> {
+        self.state
+            .as_ref()
+            .filter(|state| state.consistent_frames >= self.checked.confirm_frames)
+    }
+
+    fn start(
+        &mut self,
+        (stamp_ns, camera_from_tanker, covariance): &(i64, &Isometry3<f64>, PoseCovariance),
+        reason: StartReason,
+    ) -> TrackOutcome {
+        let mut full = Matrix12::zeros();
+        full.fixed_view_mut::<6, 6>(0, 0).copy_from(&covariance.0);
+        for axis in 0..3 {
+            full[(6 + axis, 6 + axis)] = self.checked.initial_speed_variance;
+            full[(9 + axis, 9 + axis)] = self.checked.initial_rate_variance;
+        }
+        self.state = Some(State {
+            track: Track {
+                stamp_ns: *stamp_ns,
+                motion: Motion {
+                    b_from_a: **camera_from_tanker,
+                    velocity_in_b: Vector3::zeros(),
+                    rate_in_b: Vector3::zeros(),
+                    covariance: full,
+                },
+            },
+            consistent_frames: 1,
+            seen_ns: *stamp_ns,
+        });
+        TrackOutcome::Started(reason)
+    }
+
+    fn with_floor(&self, covariance: &PoseCovariance) -> PoseCovariance {
+        let mut floored = *covariance;
+        for axis in 0..3 {
+            floored.0[(axis, axis)] += self.checked.position_floor_variance;
+            floored.0[(3 + axis, 3 + axis)] += self.checked.attitude_floor_variance;
+        }
+        floored
+    }
+}
+
+fn check(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Result<(), MeasurementError> {
+    let position = pose.translation.vector;
+    let numbers = position.iter().chain(pose.rotation.coords.iter());
+    if !numbers.copied().all(f64::is_finite) {
+        return Err(MeasurementError::PoseNotFinite);
+    }
+    if !covariance.is_valid() {
+        return Err(MeasurementError::InvalidCovariance);
+    }
+    Ok(())
+}
+
+/// Returns `later − earlier`; whole nanoseconds, so that no clock's epoch costs precision.
+fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
+    // In 128 bits the difference of any two stamps exists.
+    let nanoseconds = i128::from(later_ns) - i128::from(earlier_ns);
+    nanoseconds as f64 * 1e-9
+}

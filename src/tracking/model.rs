@@ -1,0 +1,181 @@
+//! The two formulas of the filter: how a motion goes on, and what a measured pose teaches about it.
+//!
+//! The error is that of [`Motion::covariance`], so position and attitude error stand on the left and
+//! apart. With `Σ` in blocks of six, `A` of the pose, `C` of the rates, `B` between:
+//!
+//! | step | formula |
+//! |---|---|
+//! | predict | `t + v dt`, `Exp(ω dt) R`; `Φ = diag(I, Exp(ω dt))`, `Γ = dt · diag(I, J(ω dt))` |
+//! | noise | white acceleration of density `q`: `q dt³/3` in `A`, `q dt²/2` in `B`, `q dt` in `C` |
+//! | innovation | `ν = (t_m − t, Log(R_m Rᵀ))`, `S = A + N`, `N` the measurement's covariance seen at `ν` |
+//! | update | Joseph's form, with `I − A S⁻¹` written as `N S⁻¹`: no difference of large numbers |
+
+use nalgebra::{Cholesky, Isometry3, Matrix6, Translation3, U6, UnitQuaternion, Vector3, Vector6};
+
+use crate::geometry::{
+    Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error, set,
+};
+
+/// Two-sided spectral densities, squared: what each second adds to a variance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    /// m²/s³.
+    pub(super) acceleration: f64,
+    /// rad²/s³.
+    pub(super) angular_acceleration: f64,
+}
+
+/// `Σ` in blocks.
+struct Blocks {
+    pose: Matrix6<f64>,
+    cross: Matrix6<f64>,
+    rates: Matrix6<f64>,
+}
+
+impl Blocks {
+    fn of(motion: &Motion) -> Self {
+        let block = |row, column| motion.covariance.fixed_view::<6, 6>(row, column).into_owned();
+        Self {
+            pose: block(0, 0),
+            cross: block(0, 6),
+            rates: block(6, 6),
+        }
+    }
+
+    fn store(&self, motion: &mut Motion) {
+        let mut put = |row, column, block: &Matrix6<f64>| {
+            motion
+                .covariance
+                .fixed_view_mut::<6, 6>(row, column)
+                .copy_from(block);
+        };
+        put(0, 0, &symmetric(&self.pose));
+        put(0, 6, &self.cross);
+        put(6, 0, &self.cross.transpose());
+        put(6, 6, &symmetric(&self.rates));
+    }
+}
+
+fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
+    (m + m.transpose()) * 0.5
+}
+
+fn block_diagonal(first: &nalgebra::Matrix3<f64>, second: &nalgebra::Matrix3<f64>) -> Matrix6<f64> {
+    let mut m = Matrix6::zeros();
+    set(&mut m, 0, 0, first);
+    set(&mut m, 3, 3, second);
+    m
+}
+
+/// Returns `motion` after `dt_s ≥ 0`.
+pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
+    let turn = motion.rate_in_b * dt_s;
+    let turned = UnitQuaternion::from_scaled_axis(turn);
+    let identity = nalgebra::Matrix3::identity();
+    let phi = block_diagonal(&identity, turned.to_rotation_matrix().matrix());
+    let gamma = block_diagonal(&identity, &left_jacobian(turn)) * dt_s;
+
+    let before = Blocks::of(motion);
+    let kept = phi * before.cross;
+    let gained = gamma * before.rates;
+    let crossed = kept * gamma.transpose();
+    let mut after = Blocks {
+        pose: phi * before.pose * phi.transpose()
+            + crossed
+            + crossed.transpose()
+            + gained * gamma.transpose(),
+        cross: kept + gained,
+        rates: before.rates,
+    };
+    for axis in 0..6 {
+        let q = if axis < 3 {
+            noise.acceleration
+        } else {
+            noise.angular_acceleration
+        };
+        after.pose[(axis, axis)] += q * dt_s.powi(3) / 3.0;
+        after.cross[(axis, axis)] += q * dt_s.powi(2) / 2.0;
+        after.rates[(axis, axis)] += q * dt_s;
+    }
+
+    let mut predicted = *motion;
+    predicted.b_from_a = Isometry3::from_parts(
+        Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
+        // Products of unit quaternions drift from length one by rounding.
+        UnitQuaternion::new_normalize((turned * motion.b_from_a.rotation).into_inner()),
+    );
+    after.store(&mut predicted);
+    predicted
+}
+
+/// A measured pose held against a prediction.
+pub(super) struct Innovation {
+    /// `ν`.
+    difference: Vector6<f64>,
+    /// `N`.
+    noise: Matrix6<f64>,
+    /// `A + N`.
+    factor: Cholesky<f64, U6>,
+    /// `νᵀ S⁻¹ ν`.
+    pub(super) squared: f64,
+}
+
+impl Innovation {
+    /// Returns none when the covariances are so far apart that their sum has no factor.
+    pub(super) fn new(
+        predicted: &Motion,
+        b_from_a: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> Option<Self> {
+        let difference = pose_error(b_from_a, &predicted.b_from_a);
+        // The measurement's own error turns with the attitude between the two: Log(Exp(n) Exp(φ)).
+        let turn = left_jacobian_inverse(difference.fixed_rows::<3>(3).into_owned());
+        let seen = block_diagonal(&nalgebra::Matrix3::identity(), &turn);
+        let noise = symmetric(&(seen * covariance.0 * seen.transpose()));
+        let factor = (predicted.pose_covariance().0 + noise).cholesky()?;
+        let squared = difference.dot(&factor.solve(&difference));
+        squared.is_finite().then_some(Self {
+            difference,
+            noise,
+            factor,
+            squared,
+        })
+    }
+
+    /// Returns the motion corrected by the measurement.
+    pub(super) fn corrected(&self, predicted: &Motion) -> Motion {
+        let before = Blocks::of(predicted);
+        // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N.
+        let pose_gain_t = self.factor.solve(&before.pose);
+        let rates_gain_t = self.factor.solve(&before.cross);
+        let rest_t = self.factor.solve(&self.noise);
+        let rest = rest_t.transpose();
+        let mut after = Blocks {
+            pose: rest * before.pose * rest_t + pose_gain_t.transpose() * self.noise * pose_gain_t,
+            cross: rest * before.cross,
+            rates: before.rates - before.cross.transpose() * rates_gain_t,
+        };
+
+        let pose_step = pose_gain_t.tr_mul(&self.difference);
+        let rates_step = rates_gain_t.tr_mul(&self.difference);
+        let turn: Vector3<f64> = pose_step.fixed_rows::<3>(3).into_owned();
+        // What is left of the error now stands about the corrected attitude.
+        let reset = block_diagonal(&nalgebra::Matrix3::identity(), &left_jacobian(turn));
+        after.pose = reset * after.pose * reset.transpose();
+        after.cross = reset * after.cross;
+
+        let mut corrected = *predicted;
+        corrected.b_from_a = Isometry3::from_parts(
+            Translation3::from(
+                predicted.b_from_a.translation.vector + pose_step.fixed_rows::<3>(0),
+            ),
+            UnitQuaternion::new_normalize(
+                (UnitQuaternion::from_scaled_axis(turn) * predicted.b_from_a.rotation).into_inner(),
+            ),
+        );
+        corrected.velocity_in_b += rates_step.fixed_rows::<3>(0);
+        corrected.rate_in_b += rates_step.fixed_rows::<3>(3);
+        after.store(&mut corrected);
+        corrected
+    }
+}

@@ -1,0 +1,153 @@
+//! What the filter is told about flight, and the check of it.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::model::Noise;
+
+/// How the tanker may move against the camera, and when to believe it.
+///
+/// The two densities say how fast velocity and rate become unknown: without detections a standard
+/// deviation grows as `density · √t`, so 0.2 m/s²/√Hz adds 0.2 m/s in one second, 0.4 m/s in four. An
+/// acceleration of standard deviation `a` that lasts for a time `τ` before it changes has the density
+/// `a √(2 τ)`. Too small a density makes the track lag in a manoeuvre and claim too much; too large a
+/// one only makes it noisier, so doubt is settled upwards.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilterSettings {
+    /// Spectral density of the relative acceleration on each axis, m/s²/√Hz.
+    pub acceleration_density_mps2: f64,
+    /// Spectral density of the relative angular acceleration on each axis, deg/s²/√Hz.
+    pub angular_acceleration_density_dps2: f64,
+    /// Standard deviation of the relative velocity on each axis before it was ever seen, m/s.
+    pub initial_speed_sigma_mps: f64,
+    /// Standard deviation of the relative rate on each axis before it was ever seen, deg/s.
+    pub initial_rate_sigma_dps: f64,
+    /// Added to the variance of each measured position axis: what calibration and map hide, m.
+    pub position_floor_m: f64,
+    /// Added to the variance of each measured attitude axis, degrees.
+    pub attitude_floor_deg: f64,
+    /// Probability with which a correct frame passes the gate.
+    pub gate_probability: f64,
+    /// The track is dropped this long after the last accepted frame, s.
+    pub max_gap_s: f64,
+    /// Consistent frames that make a candidate a track, the first one included.
+    pub confirm_frames: u32,
+}
+
+impl Default for FilterSettings {
+    /// A receiver that keeps station or closes slowly, in the air behind a tanker.
+    fn default() -> Self {
+        Self {
+            acceleration_density_mps2: 0.2,
+            angular_acceleration_density_dps2: 4.0,
+            initial_speed_sigma_mps: 5.0,
+            initial_rate_sigma_dps: 10.0,
+            position_floor_m: 1e-3,
+            attitude_floor_deg: 0.01,
+            gate_probability: 0.9999,
+            max_gap_s: 1.0,
+            confirm_frames: 5,
+        }
+    }
+}
+
+/// A setting outside its range.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{name}: expected {least} to {most}, got {got}")]
+pub struct FilterSettingsError {
+    /// Name of the setting.
+    pub name: &'static str,
+    /// Smallest value allowed.
+    pub least: f64,
+    /// Largest value allowed.
+    pub most: f64,
+    /// The value.
+    pub got: f64,
+}
+
+/// Settings that passed their check, in SI and radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Checked {
+    pub(super) noise: Noise,
+    /// (m/s)².
+    pub(super) initial_speed_variance: f64,
+    /// (rad/s)².
+    pub(super) initial_rate_variance: f64,
+    /// m².
+    pub(super) position_floor_variance: f64,
+    /// rad².
+    pub(super) attitude_floor_variance: f64,
+    /// Of the squared innovation.
+    pub(super) gate: f64,
+    pub(super) max_gap_s: f64,
+    pub(super) confirm_frames: u32,
+}
+
+impl FilterSettings {
+    /// Returns the settings as the filter uses them.
+    ///
+    /// The ranges keep the ratio of the largest to the smallest variance far from what doubles resolve.
+    pub(super) fn check(&self) -> Result<Checked, FilterSettingsError> {
+        let within = |name, got: f64, least: f64, most: f64| {
+            if (least..=most).contains(&got) {
+                Ok(got)
+            } else {
+                Err(FilterSettingsError {
+                    name,
+                    least,
+                    most,
+                    got,
+                })
+            }
+        };
+        let square = |value: f64| value * value;
+        let gate_probability = within("gate_probability", self.gate_probability, 0.5, 0.999_999_9)?;
+        let confirm_frames = f64::from(self.confirm_frames);
+        within("confirm_frames", confirm_frames, 2.0, 1000.0)?;
+        Ok(Checked {
+            noise: Noise {
+                acceleration: square(within(
+                    "acceleration_density_mps2",
+                    self.acceleration_density_mps2,
+                    1e-4,
+                    1e3,
+                )?),
+                angular_acceleration: square(
+                    within(
+                        "angular_acceleration_density_dps2",
+                        self.angular_acceleration_density_dps2,
+                        1e-3,
+                        1e4,
+                    )?
+                    .to_radians(),
+                ),
+            },
+            initial_speed_variance: square(within(
+                "initial_speed_sigma_mps",
+                self.initial_speed_sigma_mps,
+                1e-3,
+                1e3,
+            )?),
+            initial_rate_variance: square(
+                within(
+                    "initial_rate_sigma_dps",
+                    self.initial_rate_sigma_dps,
+                    1e-2,
+                    1e3,
+                )?
+                .to_radians(),
+            ),
+            position_floor_variance: square(within(
+                "position_floor_m",
+                self.position_floor_m,
+                1e-6,
+                1e2,
+            )?),
+            attitude_floor_variance: square(
+                within("attitude_floor_deg", self.attitude_floor_deg, 1e-5, 1e1)?.to_radians(),
+            ),
+            gate: ChiSquared::new(6.0).map_or(f64::NAN, |law| law.inverse_cdf(gate_probability)),
+            max_gap_s: within("max_gap_s", self.max_gap_s, 1e-3, 60.0)?,
+            confirm_frames: self.confirm_frames,
+        })
+    }
+}
