@@ -18,6 +18,7 @@ use tanker_pose::estimation::{
 use tanker_pose::geometry::optical_from_body;
 use tanker_pose::simulation::{Scene, paper_camera, paper_scene, pose_in_camera};
 use tanker_pose::target::Marker;
+use tanker_pose::tracking::{Filter, FilterSettings};
 
 const SIGMA_PX: f64 = 0.5;
 
@@ -162,5 +163,34 @@ fn orthogonal_iteration(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(stages, rays, estimates, exclusion, orthogonal_iteration);
+fn filter(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("filter");
+    let (camera, seen) = frame(paper_camera(), 6);
+    let solution = Estimator::new(EstimatorSettings::default())
+        .estimate(&camera, &seen, None)
+        .expect("a noisy frame is solvable");
+    let (pose, covariance) = (solution.camera_from_tanker, solution.covariance);
+    let mut filter = Filter::new(FilterSettings::default()).expect("the defaults are in range");
+    let mut stamp_ns = 0;
+    let mut step = || {
+        stamp_ns += 33_333_333;
+        filter.update(black_box(stamp_ns), &pose, &covariance)
+    };
+    for _ in 0..100 {
+        step();
+    }
+    group.bench_function("update", |bencher| bencher.iter(&mut step));
+    group.bench_function("predict", |bencher| {
+        bencher.iter(|| filter.predict(black_box(stamp_ns + 10_000_000)));
+    });
+}
+
+criterion_group!(
+    stages,
+    rays,
+    estimates,
+    exclusion,
+    orthogonal_iteration,
+    filter
+);
 criterion_main!(stages);

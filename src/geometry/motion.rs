@@ -140,9 +140,7 @@ pub(crate) fn set<const M: usize, const N: usize>(
     column: usize,
     block: &Matrix3<f64>,
 ) {
-    matrix
-        .fixed_view_mut::<3, 3>(row, column)
-        .copy_from(block);
+    matrix.fixed_view_mut::<3, 3>(row, column).copy_from(block);
 }
 
 #[cfg(test)]
@@ -162,9 +160,7 @@ mod tests {
     fn moved(motion: &Motion, error: &Vector12) -> Motion {
         Motion {
             b_from_a: Isometry3::from_parts(
-                Translation3::from(
-                    motion.b_from_a.translation.vector + error.fixed_rows::<3>(0),
-                ),
+                Translation3::from(motion.b_from_a.translation.vector + error.fixed_rows::<3>(0)),
                 UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(3).into_owned())
                     * motion.b_from_a.rotation,
             ),

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::model::{Innovation, predict};
+use super::lag::{Lag, MEMORY_FRAMES};
+use super::model::{Innovation, Noise, add_noise, predict};
 use super::settings::Checked;
 use super::{
     FilterSettings, FilterSettingsError, MeasurementError, PredictError, StartReason, TrackOutcome,
@@ -25,6 +26,7 @@ struct State {
     consistent_frames: u32,
     /// The latest stamp of any frame, accepted or not.
     seen_ns: i64,
+    lag: Lag,
 }
 
 /// Turns poses of single frames into a track. It allocates nothing and reads no clock.
@@ -67,6 +69,13 @@ impl Filter {
         self.confirmed().map(|state| &state.track)
     }
 
+    /// Returns whether the last frames moved more than the quiet noise explains, so that the larger one holds.
+    #[must_use]
+    pub fn is_manoeuvring(&self) -> bool {
+        self.confirmed()
+            .is_some_and(|state| state.lag.is_manoeuvring())
+    }
+
     /// Returns the largest squared innovation that the gate accepts.
     #[must_use]
     pub fn gate_limit(&self) -> f64 {
@@ -87,7 +96,7 @@ impl Filter {
         if gap_s > limit_s {
             return Err(PredictError::BeyondGap { gap_s, limit_s });
         }
-        Ok(predict(&state.track.motion, gap_s, &self.checked.noise))
+        Ok(predict(&state.track.motion, gap_s, self.noise(&state.lag)))
     }
 
     /// Returns how far a pose is from what the track expects at its stamp: the squared innovation over
@@ -106,10 +115,8 @@ impl Filter {
     ) -> Result<f64, PredictError> {
         let predicted = self.predict(stamp_ns)?;
         let noise = self.with_floor(covariance);
-        Ok(
-            Innovation::new(&predicted, camera_from_tanker, &noise)
-                .map_or(f64::INFINITY, |innovation| innovation.squared),
-        )
+        Ok(Innovation::new(&predicted, camera_from_tanker, &noise)
+            .map_or(f64::INFINITY, |innovation| innovation.squared))
     }
 
     /// Takes the pose of one frame and returns what became of it.
@@ -128,10 +135,10 @@ impl Filter {
             return TrackOutcome::Invalid(error);
         }
         let measured = (stamp_ns, camera_from_tanker, self.with_floor(covariance));
-        let Some(state) = self.state.as_mut() else {
+        let Some(mut state) = self.state else {
             return self.start(&measured, StartReason::First);
         };
-        let track = &state.track;
+        let track = state.track;
         if stamp_ns == state.seen_ns || stamp_ns == track.stamp_ns {
             return TrackOutcome::Duplicate { stamp_ns };
         }
@@ -149,13 +156,15 @@ impl Filter {
         }
         state.seen_ns = state.seen_ns.max(stamp_ns);
         let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
-        let predicted = predict(&track.motion, gap_s, &self.checked.noise);
-        let Some(innovation) = Innovation::new(&predicted, camera_from_tanker, &measured.2) else {
+        let mut predicted = predict(&track.motion, gap_s, self.noise(&state.lag));
+        let innovate = |from: &Motion| Innovation::new(from, camera_from_tanker, &measured.2);
+        let Some(mut innovation) = innovate(&predicted) else {
             return self.start(&measured, StartReason::LostPrecision);
         };
         let (innovation_squared, limit) = (innovation.squared, self.checked.gate);
         if innovation_squared > limit {
             if is_confirmed {
+                self.state = Some(state);
                 return TrackOutcome::Gated {
                     innovation_squared,
                     limit,
@@ -167,12 +176,29 @@ impl Filter {
             };
             return self.start(&measured, reason);
         }
+        let lag = state
+            .lag
+            .with(&innovation.whitened, gap_s, self.checked.lag_limit);
+        if lag.is_manoeuvring() && !state.lag.is_manoeuvring() {
+            // It has lagged since it began to lean, so the larger noise is owed for that time too.
+            add_noise(
+                &mut predicted,
+                MEMORY_FRAMES * gap_s,
+                &self.checked.manoeuvre_noise,
+            );
+            let Some(again) = innovate(&predicted) else {
+                return self.start(&measured, StartReason::LostPrecision);
+            };
+            innovation = again;
+        }
         let motion = innovation.corrected(&predicted);
         if motion.covariance.cholesky().is_none() {
             return self.start(&measured, StartReason::LostPrecision);
         }
         state.track = Track { stamp_ns, motion };
+        state.lag = lag;
         state.consistent_frames = state.consistent_frames.saturating_add(1);
+        self.state = Some(state);
         let (consistent_frames, needed) = (state.consistent_frames, self.checked.confirm_frames);
         if is_confirmed {
             TrackOutcome::Updated { innovation_squared }
@@ -231,8 +257,17 @@ impl Filter {
             },
             consistent_frames: 1,
             seen_ns: *stamp_ns,
+            lag: Lag::default(),
         });
         TrackOutcome::Started(reason)
+    }
+
+    fn noise(&self, lag: &Lag) -> &Noise {
+        if lag.is_manoeuvring() {
+            &self.checked.manoeuvre_noise
+        } else {
+            &self.checked.noise
+        }
     }
 
     fn with_floor(&self, covariance: &PoseCovariance) -> PoseCovariance {
@@ -261,5 +296,6 @@ fn check(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Result<(), Measu
 fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
     // In 128 bits the difference of any two stamps exists.
     let nanoseconds = i128::from(later_ns) - i128::from(earlier_ns);
-    nanoseconds as f64 * 1e-9
+    // Divided, not multiplied: ten seconds are then exactly ten.
+    nanoseconds as f64 / 1e9
 }

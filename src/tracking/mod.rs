@@ -9,11 +9,13 @@
 //! ```
 //!
 //! The state is [`Motion`](crate::geometry::Motion) of the tanker in the camera: pose, velocity and
-//! rate in camera axes, which go on unchanged except for white noise of acceleration ([`model`]). Before
+//! rate in camera axes, which go on unchanged except for white noise of acceleration ([`model`]); when
+//! several innovations lean to one side the noise is raised for a while ([`lag`]). Before
 //! [`FilterSettings::confirm_frames`] consistent frames there is a candidate and no track, and nothing
 //! is given out. [`FilterSettings::max_gap_s`] after the last accepted frame the track is dropped.
 
 mod filter;
+mod lag;
 mod model;
 mod outcome;
 mod settings;
@@ -21,3 +23,6 @@ mod settings;
 pub use filter::{Filter, Track};
 pub use outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};
 pub use settings::{FilterSettings, FilterSettingsError};
+
+#[cfg(test)]
+mod tests;

@@ -25,6 +25,16 @@ pub(super) struct Noise {
     pub(super) angular_acceleration: f64,
 }
 
+impl Noise {
+    /// Returns the noise with its densities (not their squares) multiplied.
+    pub(super) fn times(&self, factor: f64) -> Self {
+        Self {
+            acceleration: self.acceleration * factor * factor,
+            angular_acceleration: self.angular_acceleration * factor * factor,
+        }
+    }
+}
+
 /// `Σ` in blocks.
 struct Blocks {
     pose: Matrix6<f64>,
@@ -34,7 +44,12 @@ struct Blocks {
 
 impl Blocks {
     fn of(motion: &Motion) -> Self {
-        let block = |row, column| motion.covariance.fixed_view::<6, 6>(row, column).into_owned();
+        let block = |row, column| {
+            motion
+                .covariance
+                .fixed_view::<6, 6>(row, column)
+                .into_owned()
+        };
         Self {
             pose: block(0, 0),
             cross: block(0, 6),
@@ -79,7 +94,7 @@ pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
     let kept = phi * before.cross;
     let gained = gamma * before.rates;
     let crossed = kept * gamma.transpose();
-    let mut after = Blocks {
+    let after = Blocks {
         pose: phi * before.pose * phi.transpose()
             + crossed
             + crossed.transpose()
@@ -87,17 +102,6 @@ pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
         cross: kept + gained,
         rates: before.rates,
     };
-    for axis in 0..6 {
-        let q = if axis < 3 {
-            noise.acceleration
-        } else {
-            noise.angular_acceleration
-        };
-        after.pose[(axis, axis)] += q * dt_s.powi(3) / 3.0;
-        after.cross[(axis, axis)] += q * dt_s.powi(2) / 2.0;
-        after.rates[(axis, axis)] += q * dt_s;
-    }
-
     let mut predicted = *motion;
     predicted.b_from_a = Isometry3::from_parts(
         Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
@@ -105,7 +109,25 @@ pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
         UnitQuaternion::new_normalize((turned * motion.b_from_a.rotation).into_inner()),
     );
     after.store(&mut predicted);
+    add_noise(&mut predicted, dt_s, noise);
     predicted
+}
+
+/// Adds what white noise of acceleration leaves after `time_s`.
+pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
+    let covariance = &mut motion.covariance;
+    for axis in 0..6 {
+        let q = if axis < 3 {
+            noise.acceleration
+        } else {
+            noise.angular_acceleration
+        };
+        let crossed = q * time_s.powi(2) / 2.0;
+        covariance[(axis, axis)] += q * time_s.powi(3) / 3.0;
+        covariance[(axis, 6 + axis)] += crossed;
+        covariance[(6 + axis, axis)] += crossed;
+        covariance[(6 + axis, 6 + axis)] += q * time_s;
+    }
 }
 
 /// A measured pose held against a prediction.
@@ -116,6 +138,8 @@ pub(super) struct Innovation {
     noise: Matrix6<f64>,
     /// `A + N`.
     factor: Cholesky<f64, U6>,
+    /// `L⁻¹ ν` with `S = L Lᵀ`: white and of unit variance when the model is right.
+    pub(super) whitened: Vector6<f64>,
     /// `νᵀ S⁻¹ ν`.
     pub(super) squared: f64,
 }
@@ -133,11 +157,13 @@ impl Innovation {
         let seen = block_diagonal(&nalgebra::Matrix3::identity(), &turn);
         let noise = symmetric(&(seen * covariance.0 * seen.transpose()));
         let factor = (predicted.pose_covariance().0 + noise).cholesky()?;
-        let squared = difference.dot(&factor.solve(&difference));
+        let whitened = factor.l_dirty().solve_lower_triangular(&difference)?;
+        let squared = whitened.norm_squared();
         squared.is_finite().then_some(Self {
             difference,
             noise,
             factor,
+            whitened,
             squared,
         })
     }

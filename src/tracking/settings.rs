@@ -4,6 +4,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::model::Noise;
 
+/// Probability with which a track that follows well is not taken for one that lags, per frame. The
+/// price of a false alarm is small, a noisier velocity for some seconds.
+const LAG_PROBABILITY: f64 = 0.9999;
+
 /// How the tanker may move against the camera, and when to believe it.
 ///
 /// The two densities say how fast velocity and rate become unknown: without detections a standard
@@ -17,6 +21,8 @@ pub struct FilterSettings {
     pub acceleration_density_mps2: f64,
     /// Spectral density of the relative angular acceleration on each axis, deg/s²/√Hz.
     pub angular_acceleration_density_dps2: f64,
+    /// Both densities are multiplied by this while the innovations show that the track lags; 1: never.
+    pub manoeuvre_factor: f64,
     /// Standard deviation of the relative velocity on each axis before it was ever seen, m/s.
     pub initial_speed_sigma_mps: f64,
     /// Standard deviation of the relative rate on each axis before it was ever seen, deg/s.
@@ -39,7 +45,8 @@ impl Default for FilterSettings {
         Self {
             acceleration_density_mps2: 0.2,
             angular_acceleration_density_dps2: 4.0,
-            initial_speed_sigma_mps: 5.0,
+            manoeuvre_factor: 5.0,
+            initial_speed_sigma_mps: 3.0,
             initial_rate_sigma_dps: 10.0,
             position_floor_m: 1e-3,
             attitude_floor_deg: 0.01,
@@ -68,6 +75,9 @@ pub struct FilterSettingsError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Checked {
     pub(super) noise: Noise,
+    pub(super) manoeuvre_noise: Noise,
+    /// Of the squared fading mean of the innovations.
+    pub(super) lag_limit: f64,
     /// (m/s)².
     pub(super) initial_speed_variance: f64,
     /// (rad/s)².
@@ -100,26 +110,38 @@ impl FilterSettings {
             }
         };
         let square = |value: f64| value * value;
+        let limit = |probability| {
+            // Six degrees of freedom are always allowed.
+            ChiSquared::new(6.0).map_or(0.0, |law| law.inverse_cdf(probability))
+        };
         let gate_probability = within("gate_probability", self.gate_probability, 0.5, 0.999_999_9)?;
         let confirm_frames = f64::from(self.confirm_frames);
         within("confirm_frames", confirm_frames, 2.0, 1000.0)?;
+        let noise = Noise {
+            acceleration: square(within(
+                "acceleration_density_mps2",
+                self.acceleration_density_mps2,
+                1e-4,
+                1e3,
+            )?),
+            angular_acceleration: square(
+                within(
+                    "angular_acceleration_density_dps2",
+                    self.angular_acceleration_density_dps2,
+                    1e-3,
+                    1e4,
+                )?
+                .to_radians(),
+            ),
+        };
+        let factor = within("manoeuvre_factor", self.manoeuvre_factor, 1.0, 100.0)?;
         Ok(Checked {
-            noise: Noise {
-                acceleration: square(within(
-                    "acceleration_density_mps2",
-                    self.acceleration_density_mps2,
-                    1e-4,
-                    1e3,
-                )?),
-                angular_acceleration: square(
-                    within(
-                        "angular_acceleration_density_dps2",
-                        self.angular_acceleration_density_dps2,
-                        1e-3,
-                        1e4,
-                    )?
-                    .to_radians(),
-                ),
+            noise,
+            manoeuvre_noise: noise.times(factor),
+            lag_limit: if factor > 1.0 {
+                limit(LAG_PROBABILITY)
+            } else {
+                f64::INFINITY
             },
             initial_speed_variance: square(within(
                 "initial_speed_sigma_mps",
@@ -145,7 +167,7 @@ impl FilterSettings {
             attitude_floor_variance: square(
                 within("attitude_floor_deg", self.attitude_floor_deg, 1e-5, 1e1)?.to_radians(),
             ),
-            gate: ChiSquared::new(6.0).map_or(f64::NAN, |law| law.inverse_cdf(gate_probability)),
+            gate: limit(gate_probability),
             max_gap_s: within("max_gap_s", self.max_gap_s, 1e-3, 60.0)?,
             confirm_frames: self.confirm_frames,
         })

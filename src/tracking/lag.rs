@@ -1,0 +1,46 @@
+//! Does the track lag? What the innovations of a few frames say together.
+
+use nalgebra::Vector6;
+
+/// Weight of the newest innovation.
+const WEIGHT: f64 = 0.2;
+/// Frames over which the mean is taken, so to speak: the variance of one over that of the mean.
+pub(super) const MEMORY_FRAMES: f64 = (2.0 - WEIGHT) / WEIGHT;
+/// s; a manoeuvre is taken to last this long after its last sign.
+const HOLD_S: f64 = 5.0;
+
+/// The fading mean of the whitened innovations.
+///
+/// Innovations of a right model are white, of unit variance and mean zero. When the tanker moves more
+/// than the noise allows, they lean to one side, long before a single one is large enough for the gate.
+///
+/// # Source
+/// Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, section
+/// 11.2 (adjustable level process noise). DIFFERENCE: a mean of vectors instead of squares, since a lag
+/// has a direction and noise has none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Lag {
+    mean: Vector6<f64>,
+    hold_s: f64,
+}
+
+impl Lag {
+    /// Returns whether the larger noise is in force.
+    pub(super) fn is_manoeuvring(&self) -> bool {
+        self.hold_s > 0.0
+    }
+
+    /// Returns the state after one more accepted frame, `dt_s` after the last one.
+    pub(super) fn with(&self, whitened: &Vector6<f64>, dt_s: f64, limit: f64) -> Self {
+        let mean = self.mean * (1.0 - WEIGHT) + whitened * WEIGHT;
+        let leans = mean.norm_squared() * MEMORY_FRAMES > limit;
+        Self {
+            mean,
+            hold_s: if leans {
+                HOLD_S
+            } else {
+                (self.hold_s - dt_s).max(0.0)
+            },
+        }
+    }
+}
