@@ -29,7 +29,7 @@ mod points;
 mod problem;
 mod refine;
 mod residuals;
-mod symmetric6;
+pub(crate) mod symmetric6;
 mod trust;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector2};

@@ -7,6 +7,13 @@ pub(crate) type Vector = [f64; 6];
 /// Pivots below this share of their diagonal entry mean a direction that the points leave free.
 const MIN_PIVOT_SHARE: f64 = 1e-13;
 
+/// Returns a symmetric matrix as [`Factor::new`] takes it.
+#[inline]
+pub(crate) fn rows(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
+    // Columns for rows: the same numbers, and no transposition.
+    m.data.0
+}
+
 /// `A = L D Lᵀ`, `L` with ones on its diagonal.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Factor {
@@ -70,6 +77,18 @@ impl Factor {
         x
     }
 
+    /// Returns `D^(−½) L⁻¹ b`: white and of unit variance when `A` is the covariance of `b`.
+    #[inline]
+    pub(crate) fn whiten(&self, b: &Vector) -> Vector {
+        let mut x = *b;
+        for i in 0..6 {
+            for k in 0..i {
+                x[i] -= self.l[i][k] * x[k];
+            }
+        }
+        std::array::from_fn(|i| x[i] * self.inverse_d[i].sqrt())
+    }
+
     /// Returns `A⁻¹`, exactly symmetric.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Matrix6<f64> {
@@ -110,10 +129,6 @@ mod tests {
     /// Relative; condition numbers of a few thousand.
     const ROUNDING: f64 = 1e-10;
 
-    fn rows(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
-        std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
-    }
-
     #[test]
     fn solution_and_inverse_agree_with_a_library() {
         let mut random = ChaCha8Rng::seed_from_u64(6);
@@ -125,6 +140,8 @@ mod tests {
             let x = Vector6::from(factor.solve(&b.into()));
             let expected = a.cholesky().expect("positive definite");
             assert!((x - expected.solve(&b)).norm() < ROUNDING * x.norm());
+            let squared = Vector6::from(factor.whiten(&b.into())).norm_squared();
+            assert!((squared - b.dot(&x)).abs() < ROUNDING * squared);
             let inverse = expected.inverse();
             assert!((factor.inverse() - inverse).norm() < ROUNDING * inverse.norm());
             assert_eq!(factor.inverse(), factor.inverse().transpose());

@@ -8,6 +8,7 @@ use super::settings::Checked;
 use super::{
     FilterSettings, FilterSettingsError, MeasurementError, PredictError, StartReason, TrackOutcome,
 };
+use crate::estimation::symmetric6::{Factor, rows};
 use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
 /// The motion of the tanker in the camera at the time of one image.
@@ -191,10 +192,9 @@ impl Filter {
             };
             innovation = again;
         }
-        let motion = innovation.corrected(&predicted);
-        if motion.covariance.cholesky().is_none() {
+        let Some(motion) = innovation.corrected(&predicted) else {
             return self.start(&measured, StartReason::LostPrecision);
-        }
+        };
         state.track = Track { stamp_ns, motion };
         state.lag = lag;
         state.consistent_frames = state.consistent_frames.saturating_add(1);
@@ -286,7 +286,8 @@ fn check(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Result<(), Measu
     if !numbers.copied().all(f64::is_finite) {
         return Err(MeasurementError::PoseNotFinite);
     }
-    if !covariance.is_valid() {
+    let is_symmetric = covariance.0 == covariance.0.transpose();
+    if !(is_symmetric && Factor::new(&rows(&covariance.0)).is_some()) {
         return Err(MeasurementError::InvalidCovariance);
     }
     Ok(())

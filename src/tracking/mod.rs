@@ -1,6 +1,6 @@
 //! A track from poses: single frames have been estimated and judged, here they become one motion.
 //!
-//! Knows `geometry` only. Time enters as the images' stamps, whole nanoseconds; nothing here reads a
+//! Knows `geometry`, and of `estimation` its small matrices. Time enters as the images' stamps, whole nanoseconds; nothing here reads a
 //! clock, and the same frames give the same bits. One frame's way:
 //!
 //! ```text

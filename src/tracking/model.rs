@@ -10,8 +10,9 @@
 //! | innovation | `ν = (t_m − t, Log(R_m Rᵀ))`, `S = A + N`, `N` the measurement's covariance seen at `ν` |
 //! | update | Joseph's form, with `I − A S⁻¹` written as `N S⁻¹`: no difference of large numbers |
 
-use nalgebra::{Cholesky, Isometry3, Matrix6, Translation3, U6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::estimation::symmetric6::{Factor, rows};
 use crate::geometry::{
     Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error, set,
 };
@@ -68,6 +69,16 @@ impl Blocks {
         put(0, 6, &self.cross);
         put(6, 0, &self.cross.transpose());
         put(6, 6, &symmetric(&self.rates));
+    }
+}
+
+impl Blocks {
+    fn is_positive_definite(&self) -> bool {
+        let schur =
+            |factor: Factor| self.rates - self.cross.transpose() * (factor.inverse() * self.cross);
+        Factor::new(&rows(&self.pose))
+            .map(schur)
+            .is_some_and(|rest| Factor::new(&rows(&rest)).is_some())
     }
 }
 
@@ -136,9 +147,9 @@ pub(super) struct Innovation {
     difference: Vector6<f64>,
     /// `N`.
     noise: Matrix6<f64>,
-    /// `A + N`.
-    factor: Cholesky<f64, U6>,
-    /// `L⁻¹ ν` with `S = L Lᵀ`: white and of unit variance when the model is right.
+    /// `S⁻¹`.
+    inverse: Matrix6<f64>,
+    /// The square root of `S⁻¹`, times `ν`: white and of unit variance when the model is right.
     pub(super) whitened: Vector6<f64>,
     /// `νᵀ S⁻¹ ν`.
     pub(super) squared: f64,
@@ -156,25 +167,26 @@ impl Innovation {
         let turn = left_jacobian_inverse(difference.fixed_rows::<3>(3).into_owned());
         let seen = block_diagonal(&nalgebra::Matrix3::identity(), &turn);
         let noise = symmetric(&(seen * covariance.0 * seen.transpose()));
-        let factor = (predicted.pose_covariance().0 + noise).cholesky()?;
-        let whitened = factor.l_dirty().solve_lower_triangular(&difference)?;
+        let factor = Factor::new(&rows(&(predicted.pose_covariance().0 + noise)))?;
+        let whitened = Vector6::from(factor.whiten(&difference.into()));
         let squared = whitened.norm_squared();
         squared.is_finite().then_some(Self {
             difference,
             noise,
-            factor,
+            inverse: factor.inverse(),
             whitened,
             squared,
         })
     }
 
-    /// Returns the motion corrected by the measurement.
-    pub(super) fn corrected(&self, predicted: &Motion) -> Motion {
+    /// Returns the motion corrected by the measurement; none when its covariance would not be positive
+    /// definite.
+    pub(super) fn corrected(&self, predicted: &Motion) -> Option<Motion> {
         let before = Blocks::of(predicted);
         // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N.
-        let pose_gain_t = self.factor.solve(&before.pose);
-        let rates_gain_t = self.factor.solve(&before.cross);
-        let rest_t = self.factor.solve(&self.noise);
+        let pose_gain_t = self.inverse * before.pose;
+        let rates_gain_t = self.inverse * before.cross;
+        let rest_t = self.inverse * self.noise;
         let rest = rest_t.transpose();
         let mut after = Blocks {
             pose: rest * before.pose * rest_t + pose_gain_t.transpose() * self.noise * pose_gain_t,
@@ -202,6 +214,6 @@ impl Innovation {
         corrected.velocity_in_b += rates_step.fixed_rows::<3>(0);
         corrected.rate_in_b += rates_step.fixed_rows::<3>(3);
         after.store(&mut corrected);
-        corrected
+        after.is_positive_definite().then_some(corrected)
     }
 }

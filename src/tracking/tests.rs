@@ -288,7 +288,7 @@ fn an_update_is_the_textbook_one() {
     let mut measured = predicted.b_from_a;
     measured.translation.vector += Vector3::new(0.05, -0.02, 0.1);
     let innovation = Innovation::new(&predicted, &measured, &noise).expect("positive definite");
-    let corrected = innovation.corrected(&predicted);
+    let corrected = innovation.corrected(&predicted).expect("positive definite");
 
     let p = predicted.covariance;
     let s = p.fixed_view::<6, 6>(0, 0) + noise.0;
