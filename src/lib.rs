@@ -21,9 +21,11 @@
 pub mod camera;
 pub mod config;
 pub mod estimation;
+pub mod frames;
 pub mod geometry;
 pub mod picture;
 pub mod pipeline;
+pub mod refuelling;
 pub mod ros;
 pub mod simulation;
 pub mod target;

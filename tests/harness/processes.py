@@ -22,6 +22,13 @@ def binary(name: str) -> Path:
     return path
 
 
+def example(name: str) -> Path:
+    """The built example, beside the programs."""
+    path = (binary("tanker_pose").parent / "examples" / name).resolve()
+    assert path.is_file(), f"{path} is not built: run `cargo build --examples` first"
+    return path
+
+
 def child_environment(domain: int | None = None) -> dict[str, str]:
     """The environment for a child process, in a ROS domain of its own on this host alone."""
     environment = {key: value for key, value in os.environ.items() if key not in _RCLPY_ONLY}

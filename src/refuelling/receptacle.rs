@@ -1,0 +1,174 @@
+//! The receptacle relative to the probe tip, from the motion of the tanker in the camera.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::geometry::{Motion, PoseCovariance, congruent, set, skew};
+
+/// What is fixed to the two aircraft, from drawings and calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RefuellingGeometry {
+    /// The camera's mount: its optical frame (x right, y down, z ahead) in the receiver (FLU), m.
+    pub receiver_from_camera: Isometry3<f64>,
+    /// Covariance of that mount in the receiver's axes. It is the same error in every frame: no filter
+    /// averages it out.
+    pub mount_covariance: PoseCovariance,
+    /// Tip of the probe, receiver frame, m.
+    pub probe_tip_in_receiver: Point3<f64>,
+    /// Centre of drogue, basket or receptacle, tanker frame, m.
+    pub receptacle_in_tanker: Point3<f64>,
+    /// How it deviates from there, covariance in the tanker's axes, m².
+    pub receptacle_covariance: Matrix3<f64>,
+}
+
+/// Why a geometry cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: expected {expected}")]
+pub struct RefuellingGeometryError {
+    /// Which part of the geometry.
+    pub what: &'static str,
+    /// What it must be.
+    pub expected: &'static str,
+}
+
+/// A number and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertain {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
+/// The receptacle about the probe tip, in the receiver's axes (FLU).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReceptacleEstimate {
+    /// From the probe tip to the receptacle, m.
+    pub receptacle_from_probe: Vector3<f64>,
+    /// Its derivative as the receiver sees it, m/s.
+    pub velocity_in_receiver: Vector3<f64>,
+    /// Of (position, velocity), in m and m/s.
+    pub covariance: Matrix6<f64>,
+}
+
+impl RefuellingGeometry {
+    /// Returns nothing when the geometry can be used.
+    ///
+    /// # Errors
+    /// [`RefuellingGeometryError`] names the first part that is not finite, or no covariance.
+    pub fn check(&self) -> Result<(), RefuellingGeometryError> {
+        let expect = |fine: bool, what, expected| {
+            if fine {
+                Ok(())
+            } else {
+                Err(RefuellingGeometryError { what, expected })
+            }
+        };
+        const FINITE: &str = "finite numbers";
+        const COVARIANCE: &str = "a finite, symmetric matrix without negative variances";
+        let mount = &self.receiver_from_camera;
+        let numbers = mount
+            .translation
+            .vector
+            .iter()
+            .chain(mount.rotation.coords.iter());
+        expect(
+            numbers.copied().all(f64::is_finite),
+            "receiver_from_camera",
+            FINITE,
+        )?;
+        let is_finite = |point: &Point3<f64>| point.iter().copied().all(f64::is_finite);
+        let probe = &self.probe_tip_in_receiver;
+        expect(is_finite(probe), "probe_tip_in_receiver", FINITE)?;
+        let receptacle = &self.receptacle_in_tanker;
+        expect(is_finite(receptacle), "receptacle_in_tanker", FINITE)?;
+        // Zero is allowed, so the eigenvalues decide, up to rounding.
+        let m = &self.mount_covariance.0;
+        let fine = m.iter().copied().all(f64::is_finite)
+            && *m == m.transpose()
+            && m.symmetric_eigenvalues().min() >= -1e-12 * m.amax();
+        expect(fine, "mount_covariance", COVARIANCE)?;
+        let m = &self.receptacle_covariance;
+        let fine = m.iter().copied().all(f64::is_finite)
+            && *m == m.transpose()
+            && m.symmetric_eigenvalues().min() >= -1e-12 * m.amax();
+        expect(fine, "receptacle_covariance", COVARIANCE)
+    }
+
+    /// Returns the receptacle about the probe tip.
+    ///
+    /// # Inputs
+    /// * `camera_from_tanker`: the track, or its prediction at the time that matters.
+    #[must_use]
+    pub fn receptacle(&self, camera_from_tanker: &Motion) -> ReceptacleEstimate {
+        let tanker_from_receptacle = Isometry3::from_parts(
+            Translation3::from(self.receptacle_in_tanker),
+            UnitQuaternion::identity(),
+        );
+        let receiver_from_receptacle = camera_from_tanker
+            .of(&tanker_from_receptacle)
+            .seen_from(&self.receiver_from_camera);
+        let from_mount = receiver_from_receptacle.b_from_a.translation.vector
+            - self.receiver_from_camera.translation.vector;
+        let velocity = receiver_from_receptacle.velocity_in_b;
+
+        let motion = &receiver_from_receptacle.covariance;
+        let mut covariance = Matrix6::zeros();
+        for (row, from_row) in [(0, 0), (3, 6)] {
+            for (column, from_column) in [(0, 0), (3, 6)] {
+                let block = motion
+                    .fixed_view::<3, 3>(from_row, from_column)
+                    .into_owned();
+                set(&mut covariance, row, column, &block);
+            }
+        }
+        // A mount turned by δθ turns the line of sight and the velocity: δr = δo + δθ × c, δv = δθ × v.
+        let mut of_mount = Matrix6::zeros();
+        set(&mut of_mount, 0, 0, &Matrix3::identity());
+        set(&mut of_mount, 0, 3, &-skew(from_mount));
+        set(&mut of_mount, 3, 3, &-skew(velocity));
+        covariance += congruent(&of_mount, &self.mount_covariance.0);
+        let receiver_from_tanker = receiver_from_receptacle
+            .b_from_a
+            .rotation
+            .to_rotation_matrix();
+        let swing = congruent(receiver_from_tanker.matrix(), &self.receptacle_covariance);
+        let mut position = covariance.fixed_view_mut::<3, 3>(0, 0);
+        position += swing;
+
+        ReceptacleEstimate {
+            receptacle_from_probe: receiver_from_receptacle.b_from_a.translation.vector
+                - self.probe_tip_in_receiver.coords,
+            velocity_in_receiver: velocity,
+            covariance,
+        }
+    }
+}
+
+impl ReceptacleEstimate {
+    /// Returns the covariance of the position, m².
+    #[must_use]
+    pub fn position_covariance(&self) -> Matrix3<f64> {
+        self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
+    }
+
+    /// Returns the closing speed along the receiver's x axis, m/s: positive when the probe nears the
+    /// receptacle.
+    ///
+    /// Along the axis and not along the line between them: near contact that line has no direction.
+    #[must_use]
+    pub fn closing_speed_mps(&self) -> Uncertain {
+        Uncertain {
+            value: -self.velocity_in_receiver.x,
+            sigma: self.covariance[(3, 3)].max(0.0).sqrt(),
+        }
+    }
+
+    /// Returns the distance ahead along the receiver's x axis, m.
+    #[must_use]
+    pub fn distance_ahead_m(&self) -> Uncertain {
+        Uncertain {
+            value: self.receptacle_from_probe.x,
+            sigma: self.covariance[(0, 0)].max(0.0).sqrt(),
+        }
+    }
+}
