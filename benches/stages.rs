@@ -7,7 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tanker_pose::camera::{Camera, CameraInfo, Pixel, Ray};
@@ -16,6 +16,7 @@ use tanker_pose::estimation::{
     iterate_accelerated, iterate_literally,
 };
 use tanker_pose::geometry::optical_from_body;
+use tanker_pose::refuelling::Region;
 use tanker_pose::simulation::{Scene, paper_camera, paper_scene, pose_in_camera};
 use tanker_pose::target::Marker;
 use tanker_pose::tracking::{Filter, FilterSettings};
@@ -185,12 +186,27 @@ fn filter(criterion: &mut Criterion) {
     });
 }
 
+fn refuelling(criterion: &mut Criterion) {
+    let contact = Region::Cylinder {
+        min_x_m: -0.2,
+        max_x_m: 0.5,
+        radius_m: 0.3,
+    };
+    let half = Matrix3::new(0.2, 0.0, 0.0, 0.05, 0.04, 0.0, 0.02, 0.03, 0.05);
+    let covariance = half * half.transpose();
+    let mean = Vector3::new(0.4, 0.1, -0.1);
+    criterion.bench_function("refuelling/contact_probability", |bencher| {
+        bencher.iter(|| contact.probability(black_box(&mean), &covariance));
+    });
+}
+
 criterion_group!(
     stages,
     rays,
     estimates,
     exclusion,
     orthogonal_iteration,
-    filter
+    filter,
+    refuelling
 );
 criterion_main!(stages);

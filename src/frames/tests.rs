@@ -102,6 +102,8 @@ fn pose_of(motion: &Motion) -> PoseEstimate {
     }
 }
 
+type Change<'a, T> = &'a dyn Fn(&T) -> Motion;
+
 fn some_transform() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(2.0, -1.0, 3.0), Vector3::new(-0.7, 0.2, 1.1))
 }
@@ -120,7 +122,7 @@ fn every_change_of_a_motion_carries_its_covariance() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let found = some_motion(&mut random);
     let x = some_transform();
-    let changes: [(&str, &dyn Fn(&Motion) -> Motion); 3] = [
+    let changes: [(&str, Change<Motion>); 3] = [
         ("seen_from", &|m| m.seen_from(&x)),
         ("of", &|m| m.of(&x)),
         ("inverse", &|m| m.inverse()),
@@ -204,7 +206,7 @@ fn velocities_are_derivatives_of_the_changed_poses() {
         };
         (moved(&now, &error), turned)
     };
-    let changes: [&dyn Fn(&(Motion, LocalAttitude)) -> Motion; 4] = [
+    let changes: [Change<(Motion, LocalAttitude)>; 4] = [
         &|(m, _)| m.seen_from(&x),
         &|(m, _)| m.of(&x),
         &|(m, _)| m.inverse(),
@@ -274,7 +276,8 @@ fn px4_and_ros_agree_on_a_tanker_ahead_of_a_receiver_that_flies_east() {
     let px4 = flu_from_tanker
         .seen_from(&rotation_only(&frd_from_flu()))
         .in_local_axes(&attitude(east));
-    let expected = Vector3::new(-1.0, 20.0, -3.0);
+    // Left of east is north.
+    let expected = Vector3::new(1.0, 20.0, -3.0);
     assert!((px4.b_from_a.translation.vector - expected).norm() < ROUNDING);
     let translated = ros.seen_from(&rotation_only(&ned_from_enu()));
     assert!(pose_error(&translated.b_from_a, &px4.b_from_a).norm() < ROUNDING);

@@ -94,8 +94,9 @@ impl Region {
 
     /// Returns the probability that a normally distributed position is inside.
     ///
-    /// Numerical, to 1e-5: integrated adaptively along x and y, in closed form along z. A covariance of
-    /// rank below three is widened by a micrometre. NaN when it is not finite or has a negative variance.
+    /// Numerical, to 2e-6, or 1e-4 for nearly singular covariances: integrated adaptively along x and y,
+    /// in closed form along z. Each axis is widened by a micrometre, so that any covariance will do. NaN
+    /// when it is not finite or has a negative variance.
     #[must_use]
     pub fn probability(&self, mean: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
         let (x_m, section) = match *self {

@@ -2,7 +2,8 @@
 //!
 //! With `Σ = L Lᵀ` and `r = m + L u`, `u` is white. Along `u₂` the region is an interval, whose share is
 //! a difference of two error functions; along `u₁` and `u₀` an adaptive Gauss-Kronrod rule adds up. Where
-//! the middle of the distribution crosses a limit the integrand may be steep, so the range is cut there.
+//! the middle of the distribution crosses the border the integrand makes a step as wide as what is left of
+//! the distribution, so the range is cut there and on both sides of it.
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::function::erf::erfc;
@@ -13,6 +14,12 @@ const REACH: f64 = 9.0;
 const TOLERANCE: f64 = 1e-6;
 /// Halvings of a range at most.
 const MAX_DEPTH: u32 = 16;
+/// The middle, and three for each of four crossings.
+const CUTS: usize = 13;
+/// A border that the middle of the distribution crosses makes a step that ends this many sigmas away.
+const STEP_SIGMAS: f64 = 6.0;
+/// Standard deviations; a step wider than this is found without help.
+const WIDE_STEP: f64 = 1.0;
 /// m; what a position is uncertain by at least, so that every covariance has a factor.
 const LEAST_SIGMA_M: f64 = 1e-6;
 
@@ -31,14 +38,6 @@ impl Section {
         }
     }
 
-    /// The largest extent along z.
-    fn z_m(self) -> (f64, f64) {
-        match self {
-            Self::Rectangle { z_m, .. } => z_m,
-            Self::Disc { radius_m } => (-radius_m, radius_m),
-        }
-    }
-
     /// The extent along z where it is cut at `y`.
     fn z_at_m(self, y: f64) -> (f64, f64) {
         match self {
@@ -48,6 +47,54 @@ impl Section {
                 (-half, half)
             }
         }
+    }
+
+    /// Returns where the line `start + u direction` in (y, z) crosses the border, and how fast it does so;
+    /// NaN for what it does not cross.
+    fn crossings(self, start: [f64; 2], direction: [f64; 2]) -> [(f64, f64); 4] {
+        match self {
+            Self::Rectangle { y_m, z_m } => {
+                let cross = |limit: f64, axis: usize| {
+                    let speed = direction[axis];
+                    ((limit - start[axis]) / speed, speed.abs())
+                };
+                [
+                    cross(y_m.0, 0),
+                    cross(y_m.1, 0),
+                    cross(z_m.0, 1),
+                    cross(z_m.1, 1),
+                ]
+            }
+            Self::Disc { radius_m } => {
+                let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+                let (a, b) = (dot(direction, direction), dot(start, direction));
+                // NaN where the line passes by.
+                let root = (b * b - a * (dot(start, start) - radius_m * radius_m)).sqrt();
+                let speed = root / radius_m;
+                let none = (f64::NAN, f64::NAN);
+                [
+                    ((-b - root) / a, speed),
+                    ((-b + root) / a, speed),
+                    none,
+                    none,
+                ]
+            }
+        }
+    }
+
+    /// Returns where to cut the range of `u`, when about the line there is a spread of `spread_m`.
+    fn cuts(self, start: [f64; 2], direction: [f64; 2], spread_m: f64) -> [f64; CUTS] {
+        let mut cuts = [f64::NAN; CUTS];
+        cuts[0] = 0.0;
+        for (i, (at, speed)) in self.crossings(start, direction).into_iter().enumerate() {
+            cuts[1 + 3 * i] = at;
+            let width = STEP_SIGMAS * spread_m / speed;
+            if width < WIDE_STEP {
+                cuts[2 + 3 * i] = at - width;
+                cuts[3 + 3 * i] = at + width;
+            }
+        }
+        cuts
     }
 }
 
@@ -80,22 +127,11 @@ pub(super) fn region_probability(
             density(u1) * share
         };
         let range = within(section.y_m(), y_middle, l[(1, 1)]);
-        let (z_low, z_high) = section.z_m();
-        let cuts = [
-            (z_low - z_middle) / l[(2, 1)],
-            (z_high - z_middle) / l[(2, 1)],
-            0.0,
-        ];
+        let cuts = section.cuts([y_middle, z_middle], [l[(1, 1)], l[(2, 1)]], l[(2, 2)]);
         density(u0) * integrate_cut(&along_y, range, &cuts, TOLERANCE / 10.0)
     };
-    let ((y_low, y_high), (z_low, z_high)) = (section.y_m(), section.z_m());
-    let cuts = [
-        (y_low - mean.y) / l[(1, 0)],
-        (y_high - mean.y) / l[(1, 0)],
-        (z_low - mean.z) / l[(2, 0)],
-        (z_high - mean.z) / l[(2, 0)],
-        0.0,
-    ];
+    let spread_m = (l[(1, 1)].powi(2) + l[(2, 1)].powi(2) + l[(2, 2)].powi(2)).sqrt();
+    let cuts = section.cuts([mean.y, mean.z], [l[(1, 0)], l[(2, 0)]], spread_m);
     let range = within(x_m, mean.x, l[(0, 0)]);
     integrate_cut(&along_x, range, &cuts, TOLERANCE).clamp(0.0, 1.0)
 }
@@ -117,10 +153,10 @@ fn normal_between(low: f64, high: f64) -> f64 {
 }
 
 /// Returns the integral over a range, cut at those of `cuts` that lie in it.
-fn integrate_cut<const N: usize>(
+fn integrate_cut(
     f: &dyn Fn(f64) -> f64,
     (low, high): (f64, f64),
-    cuts: &[f64; N],
+    cuts: &[f64; CUTS],
     tolerance: f64,
 ) -> f64 {
     if low >= high {
@@ -130,7 +166,7 @@ fn integrate_cut<const N: usize>(
     cuts.sort_unstable_by(f64::total_cmp);
     let mut sum = 0.0;
     let mut from = low;
-    // Comparisons with NaN (a limit over a correlation of zero) are false.
+    // Comparisons with NaN are false.
     for to in cuts.into_iter().filter(|&cut| cut > low && cut < high) {
         sum += integrate(f, from, to, tolerance, MAX_DEPTH);
         from = to;
@@ -172,7 +208,7 @@ const KRONROD: [f64; 8] = [
 const GAUSS: [f64; 4] = [
     0.129_484_966_168_869_7,
     0.279_705_391_489_276_64,
-    0.381_830_050_505_118_93,
+    0.381_830_050_505_118_9,
     0.417_959_183_673_469_4,
 ];
 

@@ -50,6 +50,9 @@ pub struct ReceptacleEstimate {
     pub covariance: Matrix6<f64>,
 }
 
+const FINITE: &str = "finite numbers";
+const COVARIANCE: &str = "a finite, symmetric matrix without negative variances";
+
 impl RefuellingGeometry {
     /// Returns nothing when the geometry can be used.
     ///
@@ -63,8 +66,6 @@ impl RefuellingGeometry {
                 Err(RefuellingGeometryError { what, expected })
             }
         };
-        const FINITE: &str = "finite numbers";
-        const COVARIANCE: &str = "a finite, symmetric matrix without negative variances";
         let mount = &self.receiver_from_camera;
         let numbers = mount
             .translation

@@ -10,12 +10,10 @@
 //! | innovation | `ν = (t_m − t, Log(R_m Rᵀ))`, `S = A + N`, `N` the measurement's covariance seen at `ν` |
 //! | update | Joseph's form, with `I − A S⁻¹` written as `N S⁻¹`: no difference of large numbers |
 
-use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::estimation::symmetric6::{Factor, rows};
-use crate::geometry::{
-    Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error, set,
-};
+use crate::geometry::{Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error};
 
 /// Two-sided spectral densities, squared: what each second adds to a variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,10 +84,17 @@ fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
 
-fn block_diagonal(first: &nalgebra::Matrix3<f64>, second: &nalgebra::Matrix3<f64>) -> Matrix6<f64> {
-    let mut m = Matrix6::zeros();
-    set(&mut m, 0, 0, first);
-    set(&mut m, 3, 3, second);
+/// Returns `diag(I, r) m`: only attitudes turn.
+fn turn_rows(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
+    let turned = r * m.fixed_rows::<3>(3);
+    m.fixed_rows_mut::<3>(3).copy_from(&turned);
+    m
+}
+
+/// Returns `m diag(I, r)ᵀ`.
+fn turn_columns(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
+    let turned = m.fixed_columns::<3>(3) * r.transpose();
+    m.fixed_columns_mut::<3>(3).copy_from(&turned);
     m
 }
 
@@ -97,19 +102,18 @@ fn block_diagonal(first: &nalgebra::Matrix3<f64>, second: &nalgebra::Matrix3<f64
 pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
     let turn = motion.rate_in_b * dt_s;
     let turned = UnitQuaternion::from_scaled_axis(turn);
-    let identity = nalgebra::Matrix3::identity();
-    let phi = block_diagonal(&identity, turned.to_rotation_matrix().matrix());
-    let gamma = block_diagonal(&identity, &left_jacobian(turn)) * dt_s;
+    let phi = turned.to_rotation_matrix().into_inner();
+    let gamma = left_jacobian(turn);
 
     let before = Blocks::of(motion);
-    let kept = phi * before.cross;
-    let gained = gamma * before.rates;
-    let crossed = kept * gamma.transpose();
+    let kept = turn_rows(before.cross, &phi);
+    let gained = turn_rows(before.rates, &gamma) * dt_s;
+    let crossed = turn_columns(kept, &gamma) * dt_s;
     let after = Blocks {
-        pose: phi * before.pose * phi.transpose()
+        pose: turn_columns(turn_rows(before.pose, &phi), &phi)
             + crossed
             + crossed.transpose()
-            + gained * gamma.transpose(),
+            + turn_columns(gained, &gamma) * dt_s,
         cross: kept + gained,
         rates: before.rates,
     };
@@ -165,8 +169,7 @@ impl Innovation {
         let difference = pose_error(b_from_a, &predicted.b_from_a);
         // The measurement's own error turns with the attitude between the two: Log(Exp(n) Exp(φ)).
         let turn = left_jacobian_inverse(difference.fixed_rows::<3>(3).into_owned());
-        let seen = block_diagonal(&nalgebra::Matrix3::identity(), &turn);
-        let noise = symmetric(&(seen * covariance.0 * seen.transpose()));
+        let noise = symmetric(&turn_columns(turn_rows(covariance.0, &turn), &turn));
         let factor = Factor::new(&rows(&(predicted.pose_covariance().0 + noise)))?;
         let whitened = Vector6::from(factor.whiten(&difference.into()));
         let squared = whitened.norm_squared();
@@ -198,9 +201,9 @@ impl Innovation {
         let rates_step = rates_gain_t.tr_mul(&self.difference);
         let turn: Vector3<f64> = pose_step.fixed_rows::<3>(3).into_owned();
         // What is left of the error now stands about the corrected attitude.
-        let reset = block_diagonal(&nalgebra::Matrix3::identity(), &left_jacobian(turn));
-        after.pose = reset * after.pose * reset.transpose();
-        after.cross = reset * after.cross;
+        let reset = left_jacobian(turn);
+        after.pose = turn_columns(turn_rows(after.pose, &reset), &reset);
+        after.cross = turn_rows(after.cross, &reset);
 
         let mut corrected = *predicted;
         corrected.b_from_a = Isometry3::from_parts(
