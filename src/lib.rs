@@ -9,6 +9,8 @@
 //! simulation          seeded approaches and synthetic detections, for tools and tests
 //! picture             what a frame looks like in space, for tools that draw
 //! pipeline, config    one straight line a frame; raw parameters -> checked settings
+//! refuelling          the receptacle before the probe, and how sure that is
+//! tracking, frames    a motion from poses over time; poses for flight stacks
 //! estimation          a pose from known markers and pixels: initialise, iterate, refine, judge, covariance
 //! camera, target      pixel <-> ray; marker id -> point on the tanker
 //! geometry            rotations, poses, covariances
