@@ -30,6 +30,16 @@ struct State {
     lag: Lag,
 }
 
+/// Where a stamp stands to the last accepted one.
+enum Place {
+    /// After it, within the gap.
+    Next { gap_s: f64 },
+    /// The frame says nothing new.
+    Unusable(TrackOutcome),
+    /// On another time line: a candidate begins there.
+    Elsewhere(StartReason),
+}
+
 /// Turns poses of single frames into a track. It allocates nothing and reads no clock.
 ///
 /// A frame that comes later than one with a younger stamp is not used: nothing is computed twice.
@@ -139,25 +149,14 @@ impl Filter {
         let Some(mut state) = self.state else {
             return self.start(&measured, StartReason::First);
         };
-        let track = state.track;
-        if stamp_ns == state.seen_ns || stamp_ns == track.stamp_ns {
-            return TrackOutcome::Duplicate { stamp_ns };
-        }
-        let gap_s = seconds(stamp_ns, track.stamp_ns);
-        if gap_s.abs() > self.checked.max_gap_s {
-            let reason = if gap_s > 0.0 {
-                StartReason::Gap { gap_s }
-            } else {
-                StartReason::StampsWentBack { by_s: -gap_s }
-            };
-            return self.start(&measured, reason);
-        }
-        if gap_s < 0.0 {
-            return TrackOutcome::Late { late_by_s: -gap_s };
-        }
+        let gap_s = match self.place(&state, stamp_ns) {
+            Place::Next { gap_s } => gap_s,
+            Place::Unusable(outcome) => return outcome,
+            Place::Elsewhere(reason) => return self.start(&measured, reason),
+        };
         state.seen_ns = state.seen_ns.max(stamp_ns);
         let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
-        let mut predicted = predict(&track.motion, gap_s, self.noise(&state.lag));
+        let mut predicted = predict(&state.track.motion, gap_s, self.noise(&state.lag));
         let innovate = |from: &Motion| Innovation::new(from, camera_from_tanker, &measured.2);
         let Some(mut innovation) = innovate(&predicted) else {
             return self.start(&measured, StartReason::LostPrecision);
@@ -209,6 +208,22 @@ impl Filter {
                 consistent_frames,
                 needed,
             }
+        }
+    }
+
+    fn place(&self, state: &State, stamp_ns: i64) -> Place {
+        if stamp_ns == state.seen_ns || stamp_ns == state.track.stamp_ns {
+            return Place::Unusable(TrackOutcome::Duplicate { stamp_ns });
+        }
+        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
+        if gap_s > self.checked.max_gap_s {
+            Place::Elsewhere(StartReason::Gap { gap_s })
+        } else if gap_s < -self.checked.max_gap_s {
+            Place::Elsewhere(StartReason::StampsWentBack { by_s: -gap_s })
+        } else if gap_s < 0.0 {
+            Place::Unusable(TrackOutcome::Late { late_by_s: -gap_s })
+        } else {
+            Place::Next { gap_s }
         }
     }
 
