@@ -1,10 +1,12 @@
 //! The one call that turns observations into a judged pose.
 
-use nalgebra::{Rotation3, UnitQuaternion};
+use nalgebra::{Point3, Rotation3, UnitQuaternion};
+use smallvec::SmallVec;
 
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
-use super::exclude;
+use super::exclude::{self, Suspects};
 use super::initialise::{self, linear_rotation};
+use super::points::INLINE_POINTS;
 use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
@@ -293,12 +295,8 @@ fn count_checking(observations: &[Observation]) -> usize {
 }
 
 /// Indices of the points that may be left out: all of a few, of many those that fit worst.
-fn suspects(
-    camera: &Camera,
-    observations: &[Observation],
-    of_all: Option<&Solution>,
-) -> Vec<usize> {
-    let mut suspects: Vec<(f64, usize)> = observations
+fn suspects(camera: &Camera, observations: &[Observation], of_all: Option<&Solution>) -> Suspects {
+    let mut all: SmallVec<[(f64, usize); INLINE_POINTS]> = observations
         .iter()
         .enumerate()
         .map(|(index, seen)| {
@@ -309,9 +307,9 @@ fn suspects(
             )
         })
         .collect();
-    suspects.sort_by(|a, b| b.0.total_cmp(&a.0));
-    suspects.truncate(exclude::max_suspects(observations.len()));
-    let mut suspects: Vec<usize> = suspects.into_iter().map(|(_, index)| index).collect();
+    all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    all.truncate(exclude::max_suspects(observations.len()));
+    let mut suspects: Suspects = all.into_iter().map(|(_, index)| index).collect();
     suspects.sort_unstable();
     suspects
 }
@@ -327,8 +325,9 @@ fn dlt_seed(
                 .ray_from_pixel(o.pixel)
                 .map_err(|cause| EstimateError::NoRay { id: o.id, cause })
         })
-        .collect::<Result<Vec<Ray>, _>>()?;
-    let markers: Vec<_> = observations.iter().map(|o| o.marker_in_tanker).collect();
+        .collect::<Result<SmallVec<[Ray; INLINE_POINTS]>, _>>()?;
+    let markers: SmallVec<[Point3<f64>; INLINE_POINTS]> =
+        observations.iter().map(|o| o.marker_in_tanker).collect();
     linear_rotation(&rays, &markers)
 }
 

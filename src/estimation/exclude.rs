@@ -7,15 +7,25 @@
 //! four more degrees of freedom than that of two exclusions and tells the right pair more surely. The
 //! pose then still rests on the other points alone: data that had to be corrected are not flown.
 
+use nalgebra::Isometry3;
+use smallvec::SmallVec;
+
 use super::ambiguity::likelihood_ratio;
+use super::points::INLINE_POINTS;
 use super::{EstimateError, Excluded, Observation, Solution};
 use crate::geometry::pose_error;
 
 /// Returns how many points are suspected at most: those with the largest residuals, so that the cost
 /// stays bounded. Among many points a gross error hardly moves the fit of all, and stands out.
 pub(crate) const fn max_suspects(points: usize) -> usize {
-    if points <= 64 { 12 } else { 4 }
+    if points <= 64 { MAX_SUSPECTS } else { 4 }
 }
+const MAX_SUSPECTS: usize = 12;
+const MAX_PAIRS: usize = MAX_SUSPECTS * (MAX_SUSPECTS - 1) / 2;
+/// Indices of points that may be left out.
+pub(crate) type Suspects = SmallVec<[usize; MAX_SUSPECTS]>;
+/// Some of the points; in place unless they are many.
+type Subset = SmallVec<[Observation; INLINE_POINTS]>;
 /// Points that must remain where a prior says what is plausible: fewer leave nothing to judge by.
 pub(crate) const MIN_REMAINING_WITH_PRIOR: usize = 4;
 /// Points that must remain where nothing does: any four fit some attitude too often. Left and right
@@ -66,7 +76,7 @@ where
     P: Fn(&Solution) -> f64,
 {
     let spare = observations.len().saturating_sub(judge.min_remaining);
-    let mut scratch = Vec::with_capacity(observations.len());
+    let mut scratch = Subset::new();
     if max_outliers >= 1 && spare >= 1 {
         let singles = suspects.iter().map(|&i| [i, i]);
         let solution = best(judge, observations, &mut scratch, singles);
@@ -104,44 +114,63 @@ where
     best(judge, observations, &mut scratch, pairs())
 }
 
+/// A hypothesis that passed.
+struct Passed {
+    cost: f64,
+    left_out: [usize; 2],
+    camera_from_tanker: Isometry3<f64>,
+}
+
 /// The trusted solution with the least cost among those that leave out one of these pairs
 /// (the same index twice: one point). Another one that says something else is its rival.
 fn best<S, P>(
     judge: &Judge<S, P>,
     observations: &[Observation],
-    scratch: &mut Vec<Observation>,
-    left_out: impl Iterator<Item = [usize; 2]>,
+    scratch: &mut Subset,
+    hypotheses: impl Iterator<Item = [usize; 2]>,
 ) -> Option<Solution>
 where
     S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
     P: Fn(&Solution) -> f64,
 {
-    let mut trusted: Vec<Solution> = left_out
-        .filter_map(|[i, j]| {
-            scratch.clear();
-            let remaining = observations
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| *k != i && *k != j);
-            scratch.extend(remaining.map(|(_, seen)| *seen));
-            let mut solution = judge.trusted(scratch)?;
-            let second = (j != i).then(|| observations[j].id);
-            solution.excluded = Excluded([Some(observations[i].id), second]);
-            Some(solution)
+    let mut solve = |[i, j]: [usize; 2]| {
+        scratch.clear();
+        let remaining = observations
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| *k != i && *k != j);
+        scratch.extend(remaining.map(|(_, seen)| *seen));
+        judge.trusted(scratch)
+    };
+    let passed: SmallVec<[Passed; MAX_PAIRS]> = hypotheses
+        .filter_map(|left_out| {
+            let solution = solve(left_out)?;
+            Some(Passed {
+                cost: judge.cost(&solution),
+                left_out,
+                camera_from_tanker: solution.camera_from_tanker,
+            })
         })
         .collect();
-    trusted.sort_by(|a, b| judge.cost(a).total_cmp(&judge.cost(b)));
-    let mut trusted = trusted.into_iter();
-    let mut best = trusted.next()?;
-    if let Some(rival) = trusted.find(|other| is_elsewhere(&best, other)) {
-        let ratio = likelihood_ratio(judge.cost(&rival), judge.cost(&best));
+    let first = passed.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    // Solved once more: cheaper than to keep every solution.
+    let [i, j] = first.left_out;
+    let mut best = solve(first.left_out)?;
+    let second = (j != i).then(|| observations[j].id);
+    best.excluded = Excluded([Some(observations[i].id), second]);
+    let rival = passed
+        .iter()
+        .filter(|other| is_elsewhere(&best, &other.camera_from_tanker))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost));
+    if let Some(rival) = rival {
+        let ratio = likelihood_ratio(rival.cost, first.cost);
         best.ambiguity = best.ambiguity.max(ratio);
     }
     Some(best)
 }
 
-fn is_elsewhere(best: &Solution, other: &Solution) -> bool {
-    let error = pose_error(&other.camera_from_tanker, &best.camera_from_tanker);
+fn is_elsewhere(best: &Solution, other: &Isometry3<f64>) -> bool {
+    let error = pose_error(other, &best.camera_from_tanker);
     best.covariance
         .mahalanobis_squared(&error)
         .is_none_or(|distance| distance > ELSEWHERE)

@@ -5,7 +5,6 @@
 //! is rounded once less.
 
 use std::ops::{Add, Div, Mul, Sub};
-use std::sync::LazyLock;
 
 /// How many.
 pub(crate) const LANES: usize = 4;
@@ -239,10 +238,12 @@ impl Arithmetic for Plain {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    use std::sync::LazyLock;
+
     use pulp::x86::V3;
     use pulp::{Simd, cast, f64x4};
 
-    use super::{Arithmetic, Lane, LazyLock};
+    use super::{Arithmetic, Lane};
 
     /// AVX2 with fused multiply-add, where the processor has it; asked once.
     pub(super) static AVX2: LazyLock<Option<V3>> = LazyLock::new(V3::try_new);

@@ -7,8 +7,9 @@ use super::four::{Arithmetic, Four, LANES, Lane, Number, Plain, totals};
 use super::{EstimateError, Observation};
 use crate::camera::{Camera, Ray};
 
-/// Blocks kept without the heap: 64 points.
-const INLINE_BLOCKS: usize = 16;
+/// Points kept without the heap.
+pub(crate) const INLINE_POINTS: usize = 64;
+const INLINE_BLOCKS: usize = INLINE_POINTS / LANES;
 /// Room for a frame's blocks; six kilobytes that are filled where they stand, never moved.
 pub(crate) type Blocks = SmallVec<[Block; INLINE_BLOCKS]>;
 /// Least second moment of the markers about their line, relative to the first: a thousandth in length.

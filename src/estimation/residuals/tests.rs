@@ -1,7 +1,7 @@
 use super::*;
 use crate::camera::{Camera, CameraInfo};
 use crate::estimation::Observation;
-use crate::estimation::four::Plain;
+use crate::estimation::four::{Arithmetic, Kernel, Plain, vectorised};
 use crate::estimation::points::{Blocks, Points};
 use crate::simulation::{Scene, paper_scene};
 
@@ -205,4 +205,61 @@ fn points_behind_the_camera_have_no_residuals() {
         .linearise(&pose)
         .is_none()
     );
+}
+
+/// Linearises in whatever arithmetic it is given.
+struct Linearise<'a> {
+    points: &'a Points<'a>,
+    pose: &'a CentredPose,
+}
+
+impl Kernel for Linearise<'_> {
+    type Output = (Linearised, Slope);
+
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+        let residuals = PinholeResiduals {
+            arithmetic,
+            points: self.points,
+        };
+        let linearised = residuals.linearise(self.pose).expect("in view");
+        (linearised, residuals.slope(self.pose).expect("in view"))
+    }
+}
+
+#[test]
+fn every_arithmetic_gives_the_same_sums_but_for_rounding() {
+    let Example {
+        scene,
+        mut observations,
+        pose,
+    } = example(crate::simulation::paper_camera());
+    disturb(&mut observations);
+    let mut room = Blocks::new();
+    let points =
+        Points::new(Plain, scene.camera(), &observations, &mut room).expect("in general position");
+    let kernel = || Linearise {
+        points: &points,
+        pose: &pose,
+    };
+    let (plain, plain_slope) = kernel().run(Plain);
+    let (best, best_slope) = vectorised(kernel());
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-10 * (1.0 + b.abs());
+    for (a, b) in plain
+        .information
+        .concat()
+        .iter()
+        .zip(best.information.concat())
+    {
+        assert!(close(*a, b), "{a} {b}");
+    }
+    for slope in [plain_slope, best.slope, best_slope] {
+        assert!(close(slope.chi_squared, plain.slope.chi_squared));
+        assert!(close(
+            slope.squared_residuals_px,
+            plain.slope.squared_residuals_px
+        ));
+        for (a, b) in slope.gradient.iter().zip(plain.slope.gradient) {
+            assert!(close(*a, b), "{a} {b}");
+        }
+    }
 }
