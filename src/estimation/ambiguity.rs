@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::problem::Problem;
-use super::refine::Fit;
+use super::refine::{CentredPose, Fit};
 
 /// Chord (about rad) under which two poses are the same minimum.
 pub(crate) const SAME_MINIMUM: f64 = 0.02;
@@ -27,8 +27,7 @@ pub(crate) const NEGLIGIBLE: f64 = 60.0;
 /// none that counts, or it is the chosen pose itself.
 pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     let pose = &chosen.pose;
-    let normal = smallest_axis(&problem.points.scatter)?;
-    let start = mirrored(&pose.rotation, &pose.centre_in_camera, &normal);
+    let start = mirror_image(problem, pose)?;
     let minimum = problem.descend_below(&start, chosen.chi_squared + NEGLIGIBLE)?;
     let is_negligible = problem
         .least_chi_squared(&minimum)
@@ -38,6 +37,13 @@ pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     }
     let fit = problem.fit(&minimum.rotation).ok()?;
     (!is_same(&fit.pose.rotation, &pose.rotation)).then_some(fit)
+}
+
+/// Returns the attitude of the mirrored target; none when the markers have no plane to mirror in.
+#[inline]
+pub(crate) fn mirror_image(problem: &Problem, pose: &CentredPose) -> Option<Rotation3<f64>> {
+    let normal = smallest_axis(&problem.points.scatter)?;
+    Some(mirrored(&pose.rotation, &pose.centre_in_camera, &normal))
 }
 
 /// Returns the direction in which the markers spread least, by the closed form of the least

@@ -10,6 +10,7 @@ use super::points::INLINE_POINTS;
 use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
+use super::widen::widened;
 use super::{EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Solution};
 use crate::camera::{Camera, Ray};
 use crate::geometry::PoseCovariance;
@@ -233,7 +234,7 @@ impl Estimator {
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Solution {
             camera_from_tanker: problem.pose(fit),
-            covariance: PoseCovariance::from_point(&fit.covariance, &lever),
+            covariance: PoseCovariance::from_point(&widened(problem, fit), &lever),
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
             degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),

@@ -31,6 +31,7 @@ mod refine;
 mod residuals;
 pub(crate) mod symmetric6;
 mod trust;
+mod widen;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector2};
 

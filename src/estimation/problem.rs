@@ -217,6 +217,13 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Returns what the cost is to be divided by to rise as chi-squared does near a pose, m²; none for the
+    /// paper's cost, which is not weighted by the noise.
+    pub(crate) fn scale_of_cost(&self, pose: &CentredPose) -> Option<f64> {
+        (self.refinement == Refinement::MaximumLikelihood)
+            .then_some(pose.centre_in_camera.z * pose.centre_in_camera.z)
+    }
+
     /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; none for the
     /// paper's cost, which is not weighted by the noise.
     ///

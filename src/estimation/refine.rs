@@ -79,6 +79,16 @@ pub(crate) fn maximum_likelihood(
         if damping == 0.0 && gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
             return finish(&pose.moved(&step), &here.slope, gain, &factor, iteration);
         }
+        if damping > 0.0
+            && let Some(undamped) = Factor::new(&here.damped(0.0))
+        {
+            // In a valley more curved than its slopes tell, full steps would overshoot for ever.
+            let gradient = &here.slope.gradient;
+            let gain = dot(&undamped.solve(gradient), gradient);
+            if gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
+                return finish(&pose, &here.slope, 0.0, &undamped, iteration);
+            }
+        }
         let trial = pose.moved(&step);
         if damping == 0.0
             && pose.is_near(&step)

@@ -1,0 +1,66 @@
+//! The covariance where the error is not the parabola that its curvature promises.
+//!
+//! A flat target seen nearly face on has two minima, mirror images of each other, that run into one
+//! another: between them the image excludes hardly anything, yet at the bottom of each the curvature
+//! promises a sure attitude. Poses on the way to the mirror image show it. Where the image finds one of
+//! them plausible and the covariance does not, the covariance is widened in that direction until it does.
+
+use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
+
+use super::ambiguity::mirror_image;
+use super::four::Plain;
+use super::problem::Problem;
+use super::refine::Fit;
+
+/// rad², trace of the attitude's covariance; a surer attitude is far from its mirror image.
+const SURE: f64 = 3.05e-4; // 1°
+/// Rise of chi-squared beyond which a pose is not plausible.
+const IMPLAUSIBLE: f64 = 30.0;
+/// Shares of the way to the mirror image.
+const WAY: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+/// A squared Mahalanobis distance may be this multiple of the rise of chi-squared, plus [`SLACK`].
+const STEEPNESS: f64 = 2.0;
+const SLACK: f64 = 6.0;
+
+/// Returns the covariance of a fit, rotation before position, widened where the error is flatter than its
+/// curvature promises.
+pub(crate) fn widened(problem: &Problem, fit: &Fit) -> Matrix6<f64> {
+    let attitude = upper_left(&fit.covariance);
+    if attitude.trace() < SURE {
+        return fit.covariance;
+    }
+    flattest(problem, fit, &attitude).unwrap_or(fit.covariance)
+}
+
+#[cold]
+fn flattest(problem: &Problem, fit: &Fit, attitude: &Matrix3<f64>) -> Option<Matrix6<f64>> {
+    let pose = &fit.pose;
+    let depth = problem.scale_of_cost(pose)?;
+    let information = attitude.try_inverse()?;
+    let turn = (mirror_image(problem, pose)? * pose.rotation.inverse()).scaled_axis();
+    let here = problem.cost.value(Plain, &pose.rotation);
+    let mut worst: Option<(f64, Vector3<f64>)> = None;
+    for share in WAY {
+        let step = turn * share;
+        let there = Rotation3::new(step) * pose.rotation;
+        let rise = ((problem.cost.value(Plain, &there) - here) / depth).max(0.0);
+        let promised = step.dot(&(information * step));
+        if rise < IMPLAUSIBLE && promised > STEEPNESS * rise + SLACK {
+            let factor = promised / (rise + 1.0);
+            if worst.is_none_or(|(known, _)| factor > known) {
+                worst = Some((factor, step));
+            }
+        }
+    }
+    let (factor, step) = worst?;
+    // One sigma in the direction of the step, with all that moves with it: C + (k − 1) w wᵀ.
+    let pull = information * step;
+    let sigma = fit.covariance * Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0)
+        / pull.dot(&step).sqrt();
+    let wide = fit.covariance + sigma * sigma.transpose() * (factor - 1.0);
+    wide.iter().all(|value| value.is_finite()).then_some(wide)
+}
+
+fn upper_left(m: &Matrix6<f64>) -> Matrix3<f64> {
+    m.fixed_view::<3, 3>(0, 0).into_owned()
+}
