@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::estimation::{Excluded, Initialisation, Solution};
     use crate::geometry::PoseCovariance;
-    use crate::pipeline::Refusal;
+    use crate::pipeline::{FrameTrack, Refusal};
     use nalgebra::{Matrix6, Translation3};
 
     /// Rounding of a few products, m.
@@ -207,6 +207,7 @@ mod tests {
             used_ids: vec![1, 2],
             rejected_ids: vec![6],
             initialisation: None,
+            track: FrameTrack::default(),
         };
         let detections = [
             detection(1, 58.5, -51.3),

@@ -5,6 +5,7 @@ use nalgebra::Rotation3;
 use super::{Parameters, Settings};
 use crate::estimation::{EstimatorSettings, Initialisation, Refinement};
 use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
+use crate::tracking::FilterSettings;
 
 /// Everything that the parameters say, in the types that the node works with.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +47,9 @@ impl From<&Parameters> for Configuration {
                 estimator: estimator_settings(parameters),
                 pixel_sigma_px: parameters.double("pixel_sigma_px"),
                 rectified: parameters.bool("rectified"),
+                track: parameters
+                    .bool("track")
+                    .then(|| filter_settings(parameters)),
             },
             marker_map: parameters.text("marker_map").to_owned(),
             tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
@@ -79,6 +83,21 @@ fn estimator_settings(parameters: &Parameters) -> EstimatorSettings {
         max_outliers: parameters.count("max_outliers"),
         trust_probability: parameters.double("trust_probability"),
         max_ambiguity: parameters.double("max_ambiguity"),
+    }
+}
+
+fn filter_settings(parameters: &Parameters) -> FilterSettings {
+    let confirm_frames = parameters.count("confirm_frames");
+    FilterSettings {
+        acceleration_density_mps2: parameters.double("acceleration_density_mps2"),
+        angular_acceleration_density_dps2: parameters.double("angular_acceleration_density_dps2"),
+        manoeuvre_factor: parameters.double("manoeuvre_factor"),
+        initial_speed_sigma_mps: parameters.double("initial_speed_sigma_mps"),
+        initial_rate_sigma_dps: parameters.double("initial_rate_sigma_dps"),
+        gate_probability: parameters.double("gate_probability"),
+        max_gap_s: parameters.double("max_gap_s"),
+        confirm_frames: u32::try_from(confirm_frames).unwrap_or(u32::MAX),
+        ..FilterSettings::default()
     }
 }
 
@@ -191,6 +210,14 @@ mod tests {
             ("min_points", Integer(5)),
             ("trust_probability", Double(0.95)),
             ("max_ambiguity", Double(0.5)),
+            ("acceleration_density_mps2", Double(0.3)),
+            ("angular_acceleration_density_dps2", Double(5.0)),
+            ("manoeuvre_factor", Double(2.0)),
+            ("initial_speed_sigma_mps", Double(7.0)),
+            ("initial_rate_sigma_dps", Double(8.0)),
+            ("gate_probability", Double(0.99)),
+            ("max_gap_s", Double(0.5)),
+            ("confirm_frames", Integer(9)),
         ]);
         let estimator = &found.settings.estimator;
         assert_eq!(
@@ -206,6 +233,42 @@ mod tests {
         assert_eq!((estimator.max_outliers, estimator.min_points), (1, 5));
         assert!((estimator.trust_probability - 0.95).abs() < f64::EPSILON);
         assert!((estimator.max_ambiguity - 0.5).abs() < f64::EPSILON);
+        let track = FilterSettings {
+            acceleration_density_mps2: 0.3,
+            angular_acceleration_density_dps2: 5.0,
+            manoeuvre_factor: 2.0,
+            initial_speed_sigma_mps: 7.0,
+            initial_rate_sigma_dps: 8.0,
+            gate_probability: 0.99,
+            max_gap_s: 0.5,
+            confirm_frames: 9,
+            ..FilterSettings::default()
+        };
+        assert_eq!(found.settings.track, Some(track));
+    }
+
+    #[test]
+    fn track_is_on_with_the_filters_own_defaults_and_can_be_switched_off() {
+        let default = configuration(&[]).settings.track;
+        assert_eq!(default, Some(FilterSettings::default()));
+        let off = configuration(&[("track", Bool(false))]).settings.track;
+        assert_eq!(off, None);
+    }
+
+    #[test]
+    fn every_value_that_the_table_allows_is_one_that_the_filter_takes() {
+        for spec in crate::config::TABLE {
+            let extremes = match spec.kind {
+                crate::config::Kind::Double { min, max, .. } => [Double(min), Double(max)],
+                crate::config::Kind::Integer { min, max, .. } => [Integer(min), Integer(max)],
+                _ => continue,
+            };
+            for value in extremes {
+                let track = configuration(&[(spec.name, value.clone())]).settings.track;
+                let filter = track.map(crate::tracking::Filter::new);
+                assert!(matches!(filter, Some(Ok(_))), "{} {value}", spec.name);
+            }
+        }
     }
 
     #[test]

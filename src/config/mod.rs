@@ -1,7 +1,7 @@
 //! Raw parameters -> checked settings.
 //!
 //! `table` is the one list of parameters with their defaults and ranges; `check` holds a value against
-//! it; `parameters` keeps checked values; `configuration` makes of them what the floors below work with. Knows `estimation`; never
+//! it; `parameters` keeps checked values; `configuration` makes of them what the floors below work with. Knows `estimation` and `tracking`; never
 //! a file, a topic or where a value came from.
 
 mod check;
@@ -16,6 +16,7 @@ pub use table::{Kind, ParameterSpec, TABLE};
 pub use value::{ParameterError, ParameterValue};
 
 use crate::estimation::EstimatorSettings;
+use crate::tracking::FilterSettings;
 
 /// Everything a frame's processing depends on, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,4 +27,6 @@ pub struct Settings {
     pub pixel_sigma_px: f64,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
+    /// How poses become a track; none: they don't. Out of the filter's ranges is none, too: the table allows no such values.
+    pub track: Option<FilterSettings>,
 }

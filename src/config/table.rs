@@ -128,7 +128,7 @@ pub const TABLE: &[ParameterSpec] = &[
         name: "tanker_frame_id",
         kind: Kind::FrameId { default: "tanker" },
         read_only: true,
-        description: "child frame of the pose in /tf; axes x forward, y left, z up",
+        description: "child frame of the pose in odometry and /tf; axes x forward, y left, z up",
     },
     ParameterSpec {
         name: "publish_tf",
@@ -260,6 +260,93 @@ pub const TABLE: &[ParameterSpec] = &[
         },
         read_only: false,
         description: "refuse a pose when the second-best one is at least this likely relative to it; 1: never refuse",
+    },
+    ParameterSpec {
+        name: "track",
+        kind: Kind::Bool { default: true },
+        read_only: false,
+        description: "turn poses over time into odometry; initialisation previous starts from its prediction",
+    },
+    ParameterSpec {
+        name: "acceleration_density_mps2",
+        kind: Kind::Double {
+            default: 0.2,
+            min: 1e-4,
+            max: 1e3,
+        },
+        read_only: false,
+        description: "m/s²/√Hz, how fast the velocity relative to the tanker becomes unknown: by this many m/s in one second, \
+                      twice as many in four; an acceleration a that lasts t seconds is a √(2 t)",
+    },
+    ParameterSpec {
+        name: "angular_acceleration_density_dps2",
+        kind: Kind::Double {
+            default: 4.0,
+            min: 1e-3,
+            max: 1e4,
+        },
+        read_only: false,
+        description: "deg/s²/√Hz, the same for the relative rate of turn, in deg/s",
+    },
+    ParameterSpec {
+        name: "manoeuvre_factor",
+        kind: Kind::Double {
+            default: 5.0,
+            min: 1.0,
+            max: 100.0,
+        },
+        read_only: false,
+        description: "both densities are multiplied by this while the frames show that the track lags; 1: never",
+    },
+    ParameterSpec {
+        name: "initial_speed_sigma_mps",
+        kind: Kind::Double {
+            default: 3.0,
+            min: 1e-3,
+            max: 1e3,
+        },
+        read_only: false,
+        description: "m/s, standard deviation of the relative velocity on each axis when a track begins",
+    },
+    ParameterSpec {
+        name: "initial_rate_sigma_dps",
+        kind: Kind::Double {
+            default: 10.0,
+            min: 1e-2,
+            max: 1e3,
+        },
+        read_only: false,
+        description: "deg/s, standard deviation of the relative rate of turn on each axis when a track begins",
+    },
+    ParameterSpec {
+        name: "gate_probability",
+        kind: Kind::Double {
+            default: 0.9999,
+            min: 0.5,
+            max: 0.999_999_9,
+        },
+        read_only: false,
+        description: "probability with which a correct pose is let into the track; one that contradicts the track does not touch it",
+    },
+    ParameterSpec {
+        name: "max_gap_s",
+        kind: Kind::Double {
+            default: 1.0,
+            min: 1e-3,
+            max: 60.0,
+        },
+        read_only: false,
+        description: "s after the last pose that fitted, the track is dropped; until then odometry is predicted",
+    },
+    ParameterSpec {
+        name: "confirm_frames",
+        kind: Kind::Integer {
+            default: 5,
+            min: 2,
+            max: 1000,
+        },
+        read_only: false,
+        description: "consistent poses that make a track; before that there is no odometry",
     },
     ParameterSpec {
         name: "use_sim_time",

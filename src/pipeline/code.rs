@@ -135,7 +135,7 @@ mod tests {
                     .split_once('=')?;
                 Some((name.trim().to_owned(), value.trim().parse().ok()?))
             })
-            .filter(|(name, _)| !name.starts_with("INITIALISATION"))
+            .filter(|(name, _)| !name.starts_with("INITIALISATION_") && !name.starts_with("TRACK_"))
             .collect();
         let codes: Vec<(String, u8)> = OutcomeCode::ALL
             .iter()

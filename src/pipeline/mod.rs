@@ -1,16 +1,17 @@
 //! One frame's straight line: detections in, one outcome out, the same for node, tools and tests.
 //!
 //! ```text
-//! stamp -> camera -> frame_id -> every detection -> observations -> estimate -> trusted? -> outcome
+//! stamp -> camera -> frame_id -> every detection -> observations -> estimate -> trusted? -> track -> outcome
 //! ```
 //!
-//! Knows `estimation`, `camera`, `target`; time enters only as the stamp of a frame. Never reads a
+//! Knows `estimation`, `tracking`, `camera`, `target`; time enters only as the stamp of a frame. Never reads a
 //! clock, a file or a topic. What is missing is never replaced by a default, and every frame has an
 //! outcome: a pose, or the one reason for none.
 
 mod checks;
 mod code;
 mod outcome;
+mod track;
 
 use std::sync::Arc;
 
@@ -18,12 +19,14 @@ use nalgebra::Rotation3;
 
 use crate::camera::{Camera, CameraError, CameraInfo};
 use crate::config::Settings;
-use crate::estimation::{EstimateError, Estimator, Observation};
+use crate::estimation::{EstimateError, Estimator, EstimatorSettings, Initialisation, Observation};
 use crate::target::MarkerMap;
 
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use outcome::{FrameOutcome, Refusal};
+use track::Tracker;
+pub use track::{FrameTrack, TrackCode};
 
 /// The time at which an image was taken, as ROS carries it: never converted, so never rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Hash)]
@@ -38,6 +41,12 @@ pub struct Stamp {
 const MAX_PREVIOUS_AGE_S: f64 = 2.0;
 
 impl Stamp {
+    /// Returns the whole time in nanoseconds, of which 64 bits hold every stamp there can be.
+    #[must_use]
+    pub const fn nanoseconds(self) -> i64 {
+        self.sec as i64 * 1_000_000_000 + self.nanosec as i64
+    }
+
     /// Returns whether this is at or after `earlier`, by [`MAX_PREVIOUS_AGE_S`] at the most.
     fn follows_closely(self, earlier: Self) -> bool {
         let seconds = f64::from(self.sec) - f64::from(earlier.sec);
@@ -78,7 +87,7 @@ struct LatchedCamera {
     camera: Result<Camera, CameraError>,
 }
 
-/// The estimator with what it remembers between frames: the camera, and the last trusted attitude.
+/// The estimator with what it remembers between frames: the camera, the last trusted attitude, the track.
 #[derive(Debug)]
 pub struct Pipeline {
     settings: Settings,
@@ -87,6 +96,7 @@ pub struct Pipeline {
     camera: Option<LatchedCamera>,
     /// Rotation of the last trusted pose, with its time.
     previous: Option<(Rotation3<f64>, Stamp)>,
+    tracker: Tracker,
 }
 
 impl Pipeline {
@@ -95,6 +105,7 @@ impl Pipeline {
     pub fn new(settings: Settings, map: Arc<MarkerMap>) -> Self {
         Self {
             estimator: Estimator::new(settings.estimator.clone()),
+            tracker: Tracker::new(settings.track),
             settings,
             map,
             camera: None,
@@ -102,17 +113,26 @@ impl Pipeline {
         }
     }
 
-    /// Replaces the settings from the next frame on; the camera and the last attitude stay.
+    /// Replaces the settings from the next frame on; camera, last attitude and track stay.
     pub fn set_settings(&mut self, settings: Settings) {
         if settings.estimator != *self.estimator.settings() {
             self.estimator = Estimator::new(settings.estimator.clone());
         }
-        if settings.rectified != self.settings.rectified
-            && let Some(latched) = &mut self.camera
-        {
-            latched.camera = Camera::from_info(&latched.info, settings.rectified);
+        if settings.rectified != self.settings.rectified {
+            // The rectified camera looks elsewhere.
+            self.reset();
+            if let Some(latched) = &mut self.camera {
+                latched.camera = Camera::from_info(&latched.info, settings.rectified);
+            }
         }
+        self.tracker.set_settings(settings.track);
         self.settings = settings;
+    }
+
+    /// Forgets the last attitude and the track: the next frame is the first.
+    pub fn reset(&mut self) {
+        self.previous = None;
+        self.tracker.reset();
     }
 
     /// Latches a camera info; returns whether it differs from the one before.
@@ -126,6 +146,14 @@ impl Pipeline {
             && latched.frame_id == frame_id
         {
             return latched.camera.as_ref().map(|_| false).map_err(Clone::clone);
+        }
+        if self
+            .camera
+            .as_ref()
+            .is_some_and(|latched| latched.frame_id != frame_id)
+        {
+            // What was seen from there says nothing about here.
+            self.reset();
         }
         let camera = Camera::from_info(info, self.settings.rectified);
         let result = camera.as_ref().map(|_| true).map_err(Clone::clone);
@@ -146,21 +174,75 @@ impl Pipeline {
 
     /// Returns the outcome of one frame.
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
-        let previous = self
-            .previous
-            .filter(|(_, stamp)| frame.stamp.follows_closely(*stamp));
-        let outcome = match self.observations(frame) {
+        let mut outcome = match self.observations(frame) {
             Ok((camera, observations)) => {
-                let rotation = previous.as_ref().map(|(rotation, _)| rotation);
-                solve(&self.estimator, camera, &observations, rotation)
+                let previous = self.expected_rotation(frame.stamp);
+                let outcome = solve(&self.estimator, camera, &observations, previous.as_ref());
+                self.resolved(frame.stamp, camera, &observations, &outcome)
+                    .unwrap_or(outcome)
             }
             Err(refusal) => FrameOutcome::refused(refusal),
         };
+        self.tracker.follow(frame.stamp, &mut outcome);
         if let Ok(solution) = &outcome.result {
             let rotation = solution.camera_from_tanker.rotation.to_rotation_matrix();
             self.previous = Some((rotation, frame.stamp));
         }
         outcome
+    }
+
+    /// Returns the outcome of a frame whose detections could not be read: the header's fault, if it has one, or
+    /// else `refusal`.
+    pub fn refuse(&mut self, stamp: Stamp, frame_id: &str, refusal: Refusal) -> FrameOutcome {
+        let fault = self.camera_for(stamp, frame_id).err();
+        let mut outcome = FrameOutcome::refused(fault.unwrap_or(refusal));
+        self.tracker.follow(stamp, &mut outcome);
+        outcome
+    }
+
+    /// Returns where [`Initialisation::Previous`] starts: what the track expects, or else the last attitude.
+    fn expected_rotation(&self, stamp: Stamp) -> Option<Rotation3<f64>> {
+        if self.estimator.settings().initialisation != Initialisation::Previous {
+            return None;
+        }
+        let last = || {
+            self.previous
+                .filter(|(_, earlier)| stamp.follows_closely(*earlier))
+                .map(|(rotation, _)| rotation)
+        };
+        self.tracker.expected_rotation(stamp).or_else(last)
+    }
+
+    /// Returns the outcome of a frame refused as ambiguous when the track contradicts exactly one of its two
+    /// poses: the other one, with the ambiguity that the image gives it.
+    ///
+    /// With [`Initialisation::Previous`] only: who starts elsewhere wants frames that stand alone.
+    fn resolved(
+        &self,
+        stamp: Stamp,
+        camera: &Camera,
+        observations: &[Observation],
+        refused: &FrameOutcome,
+    ) -> Option<FrameOutcome> {
+        let settings = self.estimator.settings();
+        let doubtful = refused.doubtful.as_ref()?;
+        if settings.initialisation != Initialisation::Previous
+            || !matches!(refused.result, Err(Refusal::Ambiguous { .. }))
+            || doubtful.excluded.ids().next().is_some()
+        {
+            return None;
+        }
+        let both = self.estimator.both_poses(camera, observations, doubtful)?;
+        let choice = self.tracker.choice(stamp, &both)?;
+        let [first, second] = both;
+        let chosen = if choice == 0 { first } else { second };
+        let whatever_the_ambiguity = EstimatorSettings {
+            max_ambiguity: 1.0,
+            ..settings.clone()
+        };
+        let mut outcome = FrameOutcome::judged(chosen, observations, &whatever_the_ambiguity);
+        outcome.track.has_chosen = true;
+        outcome.result.is_ok().then_some(outcome)
     }
 
     /// Returns the camera of a frame with this header.

@@ -3,7 +3,7 @@
 use crate::camera::CameraError;
 use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
 
-use super::Stamp;
+use super::{FrameTrack, Stamp};
 use crate::text::{clip, list};
 
 /// Why a frame gives no pose. Each says what was expected and what came.
@@ -222,6 +222,8 @@ pub struct FrameOutcome {
     pub rejected_ids: Vec<u32>,
     /// Where the iteration started; none when no solve was attempted.
     pub initialisation: Option<Initialisation>,
+    /// What the frame did to the track, if there is one.
+    pub track: FrameTrack,
 }
 
 impl FrameOutcome {
@@ -234,6 +236,7 @@ impl FrameOutcome {
             used_ids: Vec::new(),
             rejected_ids: Vec::new(),
             initialisation: None,
+            track: FrameTrack::default(),
         }
     }
 
@@ -257,6 +260,7 @@ impl FrameOutcome {
             used_ids,
             rejected_ids,
             initialisation,
+            track: FrameTrack::default(),
         }
     }
 

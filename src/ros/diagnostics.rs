@@ -3,7 +3,8 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::pipeline::OutcomeCode;
+use crate::pipeline::{OutcomeCode, TrackCode};
+use crate::tracking::TrackOutcome;
 
 use super::messages::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
 
@@ -51,6 +52,8 @@ impl fmt::Display for CameraState {
 pub struct Tally {
     /// Frames by outcome, in the order of [`OutcomeCode::ALL`].
     outcomes: [u64; OutcomeCode::ALL.len()],
+    /// Frames by what they did to the track, in the order of [`TrackCode::ALL`].
+    tracks: [u64; TrackCode::ALL.len()],
     /// Camera infos received.
     pub camera_infos: u64,
     /// Samples that could not be decoded.
@@ -63,6 +66,11 @@ impl Tally {
     /// Counts a frame.
     pub const fn count(&mut self, outcome: OutcomeCode) {
         self.outcomes[outcome as usize] += 1;
+    }
+
+    /// Counts what a frame did to the track.
+    pub const fn count_track(&mut self, track: TrackCode) {
+        self.tracks[track as usize] += 1;
     }
 
     /// Returns how many frames had this outcome.
@@ -79,7 +87,7 @@ impl Tally {
 }
 
 /// What the report needs beside the counts.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Situation<'a> {
     /// The node's time.
     pub now: Time,
@@ -93,6 +101,8 @@ pub struct Situation<'a> {
     pub camera: &'a CameraState,
     /// Message of the last refusal since the last report.
     pub last_refusal: Option<&'a str>,
+    /// What the last frame did to the track.
+    pub track: Option<&'a TrackOutcome>,
     /// Publishers of the detections in the graph.
     pub publishers: usize,
     /// Longest time from a message to its outcome since the last report.
@@ -222,6 +232,14 @@ fn values(
                 )
             }),
     );
+    let track = situation
+        .track
+        .map_or("none".to_owned(), ToString::to_string);
+    pairs.push(("track".to_owned(), track));
+    pairs.extend(TrackCode::ALL.iter().map(|code| {
+        let count = tally.tracks[*code as usize];
+        (format!("track.{}", code.name()), count.to_string())
+    }));
     pairs
         .into_iter()
         .map(|(key, value)| KeyValue { key, value })
@@ -242,6 +260,7 @@ mod tests {
             marker_map: "paper",
             camera,
             last_refusal: Some("need 4 points, got 3"),
+            track: None,
             publishers: 1,
             slowest: Duration::from_micros(1500),
         }

@@ -9,7 +9,7 @@ use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
-    CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message,
+    CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
     PoseWithCovarianceStamped, TFMessage,
 };
 use super::once::SaidOnce;
@@ -19,6 +19,7 @@ use crate::picture::Picture;
 use crate::pipeline::{
     Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp,
 };
+use crate::tracking::TrackOutcome;
 
 /// Seconds without detections before that is said.
 const SILENCE_S: u32 = 3;
@@ -72,8 +73,12 @@ pub struct Outputs {
     pub pose: Output<PoseWithCovarianceStamped>,
     /// One message for every frame.
     pub status: Output<EstimatorStatus>,
-    /// Trusted poses as transforms, if wanted, with the name of the child frame.
-    pub transform: Option<(Output<TFMessage>, String)>,
+    /// Pose and twist of the track, at every frame while there is one.
+    pub odometry: Output<Odometry>,
+    /// Name of the child frame of odometry and transforms.
+    pub tanker_frame_id: String,
+    /// Trusted poses as transforms, if wanted.
+    pub transform: Option<Output<TFMessage>>,
     /// What can be drawn of a frame, if wanted.
     pub markers: Option<Output<MarkerArray>>,
     /// The node's health.
@@ -91,6 +96,7 @@ pub struct Estimator {
     tally: Tally,
     reporter: Reporter,
     last_refusal: Option<String>,
+    last_track: Option<TrackOutcome>,
     slowest: Duration,
     last_report: Instant,
     refusals: SaidOnce<OutcomeCode>,
@@ -122,6 +128,7 @@ impl Estimator {
             tally: Tally::default(),
             reporter: Reporter::default(),
             last_refusal: None,
+            last_track: None,
             slowest: Duration::ZERO,
             last_report: Instant::now(),
             refusals: SaidOnce::default(),
@@ -159,9 +166,10 @@ impl Estimator {
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);
             self.publish_transform(&header, solution);
         }
+        self.publish_odometry(&header, &outcome);
         let mut status = convert::status(header.clone(), &outcome, solve_time);
         status.rejected_ids.extend(sighting.ignored_ids);
-        self.take_note(outcome.code(), &status.message, frame.stamp, solve_time);
+        self.take_note(&outcome, &status.message, frame.stamp, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
@@ -183,13 +191,7 @@ impl Estimator {
             detections,
         };
         let outcome = match refusal {
-            // The header first, as for every frame.
-            Some(refusal) => FrameOutcome::refused(
-                self.pipeline
-                    .camera_for(frame.stamp, &frame.frame_id)
-                    .err()
-                    .unwrap_or(refusal),
-            ),
+            Some(refusal) => self.pipeline.refuse(frame.stamp, &frame.frame_id, refusal),
             None => self.pipeline.process(&frame),
         };
         (frame, outcome)
@@ -200,6 +202,12 @@ impl Estimator {
         self.pipeline.set_settings(settings);
         // Whether the image is rectified decides how the camera info is read.
         self.note_camera();
+    }
+
+    /// Forgets the track and the last attitude.
+    pub fn on_reset(&mut self) {
+        self.pipeline.reset();
+        log::info!("track and last attitude are forgotten, as asked by ~/reset");
     }
 
     /// Takes note of a sample on `topic` that could not be decoded.
@@ -219,6 +227,7 @@ impl Estimator {
             marker_map: self.reader.map.name(),
             camera: &self.camera,
             last_refusal: self.last_refusal.as_deref(),
+            track: self.last_track.as_ref(),
             publishers,
             slowest: self.slowest,
         };
@@ -233,21 +242,44 @@ impl Estimator {
     }
 
     fn publish_transform(&mut self, header: &Header, solution: &Solution) {
-        let Some((output, child)) = &mut self.outputs.transform else {
-            return;
-        };
-        if *child == header.frame_id {
-            if self.own_child.fault((), Instant::now()) {
-                log::warn!(
-                    "no transform: the camera's frame and tanker_frame_id are both {child:?}"
-                );
-            }
+        if self.is_own_child(header) {
             return;
         }
+        let Some(output) = &mut self.outputs.transform else {
+            return;
+        };
+        let child = &self.outputs.tanker_frame_id;
         output.publish(
             convert::transform(header.clone(), child, solution),
             &mut self.tally,
         );
+    }
+
+    /// Publishes the track at the frame's stamp, if there is one.
+    fn publish_odometry(&mut self, header: &Header, outcome: &FrameOutcome) {
+        let Some(motion) = &outcome.track.motion else {
+            return;
+        };
+        if self.is_own_child(header) {
+            return;
+        }
+        let child = &self.outputs.tanker_frame_id;
+        self.outputs.odometry.publish(
+            convert::odometry(header.clone(), child, motion),
+            &mut self.tally,
+        );
+    }
+
+    /// Says so when camera and tanker have the same frame: nobody could tell which one is meant.
+    fn is_own_child(&mut self, header: &Header) -> bool {
+        let child = &self.outputs.tanker_frame_id;
+        let is_same = *child == header.frame_id;
+        if is_same && self.own_child.fault((), Instant::now()) {
+            log::warn!(
+                "no odometry, no transform: the camera's frame and tanker_frame_id are both {child:?}"
+            );
+        }
+        is_same
     }
 
     /// Publishes what can be drawn; of a refused frame only the camera, if it is that of the frame.
@@ -289,12 +321,15 @@ impl Estimator {
 
     fn take_note(
         &mut self,
-        outcome: OutcomeCode,
+        frame: &FrameOutcome,
         message: &str,
         stamp: Stamp,
         solve_time: Duration,
     ) {
+        let outcome = frame.code();
         self.tally.count(outcome);
+        self.tally.count_track(frame.track.code());
+        self.last_track = frame.track.outcome;
         self.slowest = self.slowest.max(solve_time);
         if outcome == OutcomeCode::Ok {
             if let Some(count) = self.refusals.good() {

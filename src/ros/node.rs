@@ -34,6 +34,8 @@ pub const NODE_NAME: &str = "tanker_pose";
 pub const CAMERA_INFO: &str = "camera_info";
 /// Output: trusted poses.
 pub const POSE: &str = "pose";
+/// Output: the track, pose and twist.
+pub const ODOMETRY: &str = "odometry";
 /// Output: what became of every image.
 pub const STATUS: &str = "status";
 /// Output: what can be drawn of it.
@@ -156,6 +158,7 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
         (DETECTIONS, Role::Subscription, &INPUT),
         (CAMERA_INFO, Role::Subscription, &INPUT),
         (POSE, Role::Publisher, &OUTPUT),
+        (ODOMETRY, Role::Publisher, &OUTPUT),
         (STATUS, Role::Publisher, &OUTPUT),
         (MARKERS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
@@ -210,7 +213,7 @@ fn introduce(
         (configuration.publish_tf, "/tf"),
         (configuration.publish_markers, MARKERS),
     ];
-    let published: Vec<String> = [POSE, STATUS, "/diagnostics"]
+    let published: Vec<String> = [POSE, ODOMETRY, STATUS, "/diagnostics"]
         .into_iter()
         .chain(optional.iter().filter(|(on, _)| *on).map(|(_, name)| *name))
         .map(topic)
@@ -240,8 +243,7 @@ impl Service {
         clock: &NodeClock,
     ) -> Result<Self, EndpointError> {
         let transform = if configuration.publish_tf {
-            let child = configuration.tanker_frame_id.clone();
-            Some((output(ros, "/tf", &TRANSFORMS)?, child))
+            Some(output(ros, "/tf", &TRANSFORMS)?)
         } else {
             None
         };
@@ -252,6 +254,8 @@ impl Service {
         };
         let outputs = Outputs {
             pose: output(ros, POSE, &OUTPUT)?,
+            odometry: output(ros, ODOMETRY, &OUTPUT)?,
+            tanker_frame_id: configuration.tanker_frame_id.clone(),
             status: output(ros, STATUS, &OUTPUT)?,
             transform,
             markers,

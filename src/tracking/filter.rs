@@ -69,6 +69,16 @@ impl Filter {
         &self.settings
     }
 
+    /// Takes other settings from the next frame on; track and candidate stay.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; nothing is changed then.
+    pub fn set_settings(&mut self, settings: FilterSettings) -> Result<(), FilterSettingsError> {
+        self.checked = settings.check()?;
+        self.settings = settings;
+        Ok(())
+    }
+
     /// Forgets track and candidate; the next pose is the first.
     pub fn reset(&mut self) {
         self.state = None;
@@ -236,6 +246,9 @@ impl Filter {
         if gap_s > self.checked.max_gap_s {
             self.state = None;
             return TrackOutcome::Dropped { gap_s };
+        }
+        if stamp_ns == state.track.stamp_ns {
+            return TrackOutcome::Duplicate { stamp_ns };
         }
         if gap_s < 0.0 {
             return TrackOutcome::Late { late_by_s: -gap_s };

@@ -1,5 +1,7 @@
 //! What became of one frame in the track, and why a track gives no prediction.
 
+use std::fmt;
+
 /// What one frame did to the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -79,6 +81,53 @@ pub enum StartReason {
     },
     /// The covariance of the track was no longer positive definite; not seen in any test.
     LostPrecision,
+}
+
+impl fmt::Display for TrackOutcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Started(reason) => write!(f, "a candidate begins: {reason}"),
+            Self::Confirming {
+                consistent_frames,
+                needed,
+            } => write!(f, "confirming, {consistent_frames} of {needed} frames"),
+            Self::Acquired => write!(f, "confirmed"),
+            Self::Updated { innovation_squared } => {
+                write!(f, "updated, squared innovation {innovation_squared:.1}")
+            }
+            Self::Gated {
+                innovation_squared,
+                limit,
+            } => write!(
+                f,
+                "expected a squared innovation of at most {limit:.1}, got {innovation_squared:.1}: not used"
+            ),
+            Self::Duplicate { .. } => write!(f, "a stamp that has been seen: not used"),
+            Self::Late { late_by_s } => write!(f, "late by {late_by_s:.3} s: not used"),
+            Self::Invalid(error) => write!(f, "{error}"),
+            Self::Coasting { gap_s } => write!(f, "no pose for {gap_s:.3} s"),
+            Self::Dropped { gap_s } => write!(f, "dropped, no pose for {gap_s:.3} s"),
+            Self::Idle => write!(f, "none"),
+        }
+    }
+}
+
+impl fmt::Display for StartReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::First => write!(f, "there was none"),
+            Self::Gap { gap_s } => write!(f, "the last one ended {gap_s:.3} s ago"),
+            Self::StampsWentBack { by_s } => write!(f, "stamps went back by {by_s:.3} s"),
+            Self::Inconsistent {
+                innovation_squared,
+                limit,
+            } => write!(
+                f,
+                "expected a squared innovation of at most {limit:.1}, got {innovation_squared:.1}"
+            ),
+            Self::LostPrecision => write!(f, "the covariance was none"),
+        }
+    }
 }
 
 /// Why a pose is no measurement.

@@ -7,9 +7,12 @@ mod vision;
 
 use std::time::Duration;
 
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
+
 use super::messages::{self, EstimatorStatus, Header, Time};
 use crate::camera;
 use crate::estimation::{Initialisation, Solution};
+use crate::geometry::{Motion, PoseCovariance};
 use crate::pipeline::{Detection, FrameOutcome, Stamp};
 
 pub use apriltags::{TagDetections, tag_detections};
@@ -73,20 +76,64 @@ pub fn camera_info(message: &messages::CameraInfo) -> camera::CameraInfo {
 /// Returns the pose message of a trusted solution.
 #[must_use]
 pub fn pose(header: Header, solution: &Solution) -> messages::PoseWithCovarianceStamped {
-    let translation = &solution.camera_from_tanker.translation.vector;
     messages::PoseWithCovarianceStamped {
         header,
-        pose: messages::PoseWithCovariance {
-            pose: messages::Pose {
-                position: messages::Point {
-                    x: translation.x,
-                    y: translation.y,
-                    z: translation.z,
-                },
-                orientation: orientation(solution),
+        pose: pose_with_covariance(&solution.camera_from_tanker, &solution.covariance),
+    }
+}
+
+/// Returns the odometry message of a track: the twist is in the axes of the tanker.
+#[must_use]
+pub fn odometry(
+    header: Header,
+    tanker_frame_id: &str,
+    camera_from_tanker: &Motion,
+) -> messages::Odometry {
+    let twist = camera_from_tanker.twist_in_a();
+    messages::Odometry {
+        header,
+        child_frame_id: tanker_frame_id.to_owned(),
+        pose: pose_with_covariance(
+            &camera_from_tanker.b_from_a,
+            &camera_from_tanker.pose_covariance(),
+        ),
+        twist: messages::TwistWithCovariance {
+            twist: messages::Twist {
+                linear: vector(&twist.linear),
+                angular: vector(&twist.angular),
             },
-            covariance: solution.covariance.row_major(),
+            covariance: row_major(&twist.covariance),
         },
+    }
+}
+
+fn pose_with_covariance(
+    camera_from_tanker: &Isometry3<f64>,
+    covariance: &PoseCovariance,
+) -> messages::PoseWithCovariance {
+    let translation = &camera_from_tanker.translation.vector;
+    messages::PoseWithCovariance {
+        pose: messages::Pose {
+            position: messages::Point {
+                x: translation.x,
+                y: translation.y,
+                z: translation.z,
+            },
+            orientation: orientation(&camera_from_tanker.rotation),
+        },
+        covariance: covariance.row_major(),
+    }
+}
+
+fn row_major(matrix: &Matrix6<f64>) -> [f64; 36] {
+    std::array::from_fn(|index| matrix[(index / 6, index % 6)])
+}
+
+fn vector(vector: &Vector3<f64>) -> messages::Vector3 {
+    messages::Vector3 {
+        x: vector.x,
+        y: vector.y,
+        z: vector.z,
     }
 }
 
@@ -97,17 +144,12 @@ pub fn transform(
     tanker_frame_id: &str,
     solution: &Solution,
 ) -> messages::TFMessage {
-    let translation = &solution.camera_from_tanker.translation.vector;
     let transform = messages::TransformStamped {
         header,
         child_frame_id: tanker_frame_id.to_owned(),
         transform: messages::Transform {
-            translation: messages::Vector3 {
-                x: translation.x,
-                y: translation.y,
-                z: translation.z,
-            },
-            rotation: orientation(solution),
+            translation: vector(&solution.camera_from_tanker.translation.vector),
+            rotation: orientation(&solution.camera_from_tanker.rotation),
         },
     };
     messages::TFMessage {
@@ -117,8 +159,8 @@ pub fn transform(
 
 /// Of the two quaternions of a rotation, the one with `w ≥ 0`: the same attitude is always the same
 /// message.
-fn orientation(solution: &Solution) -> messages::Quaternion {
-    let q = solution.camera_from_tanker.rotation.quaternion();
+fn orientation(rotation: &UnitQuaternion<f64>) -> messages::Quaternion {
+    let q = rotation.quaternion();
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     messages::Quaternion {
         x: sign * q.i,
@@ -152,6 +194,7 @@ pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> Est
         initialisation: initialisation(frame.initialisation),
         ambiguity: number(|solution| solution.ambiguity),
         solve_time: duration(solve_time),
+        track: frame.track.code().number(),
     }
 }
 

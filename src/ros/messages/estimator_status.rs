@@ -31,6 +31,8 @@ pub struct EstimatorStatus {
     pub ambiguity: f64,
     /// From the message in hand to the outcome.
     pub solve_time: Duration,
+    /// A [`TrackCode`](crate::pipeline::TrackCode) as its number.
+    pub track: u8,
 }
 
 impl EstimatorStatus {

@@ -60,6 +60,7 @@ macro_rules! ros_message {
 ros_message!(
     "geometry_msgs" / PoseStamped,
     "geometry_msgs" / PoseWithCovarianceStamped,
+    "nav_msgs" / Odometry,
     "sensor_msgs" / CameraInfo,
     "tf2_msgs" / TFMessage,
     "diagnostic_msgs" / DiagnosticArray,

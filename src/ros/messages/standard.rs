@@ -118,6 +118,25 @@ pub struct PoseWithCovarianceStamped {
     pub pose: PoseWithCovariance,
 }
 
+/// `geometry_msgs/Twist`, in the axes that its message says.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Twist {
+    /// m/s.
+    pub linear: Vector3,
+    /// rad/s.
+    pub angular: Vector3,
+}
+
+/// `geometry_msgs/TwistWithCovariance`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TwistWithCovariance {
+    /// The twist.
+    pub twist: Twist,
+    /// Row-major 6×6: linear, then angular; m/s and rad/s.
+    #[serde(with = "BigArray")]
+    pub covariance: [f64; 36],
+}
+
 /// `geometry_msgs/Transform`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Transform {
@@ -143,6 +162,37 @@ pub struct TransformStamped {
 pub struct TFMessage {
     /// Any number of transforms.
     pub transforms: Vec<TransformStamped>,
+}
+
+// ---- nav_msgs, std_srvs ------------------------------------------------------------------------
+
+/// `nav_msgs/Odometry`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Odometry {
+    /// Time, and the frame of the pose.
+    pub header: Header,
+    /// What moves, and the frame of the twist.
+    pub child_frame_id: String,
+    /// The child's pose in the frame of the header.
+    pub pose: PoseWithCovariance,
+    /// The child's twist against the frame of the header, in the axes of the child.
+    pub twist: TwistWithCovariance,
+}
+
+/// Request of `std_srvs/Trigger`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct TriggerRequest {
+    /// Nothing: ROS has no empty messages.
+    pub structure_needs_at_least_one_member: u8,
+}
+
+/// Response of `std_srvs/Trigger`.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct TriggerResponse {
+    /// Whether it was done.
+    pub success: bool,
+    /// For people.
+    pub message: String,
 }
 
 // ---- sensor_msgs -------------------------------------------------------------------------------

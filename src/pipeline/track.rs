@@ -1,0 +1,201 @@
+//! What a frame does to the track, and what the track does for a frame.
+//!
+//! The track never touches a single frame's pose, with one exception, in [`Tracker::choice`]: of two poses that
+//! an image cannot tell apart it may choose. A frame so chosen does not correct the track, so that a wrong track
+//! cannot feed itself: [`FilterSettings::max_gap_s`] after the last frame that stood on its own, it ends.
+
+use nalgebra::Rotation3;
+
+use super::{FrameOutcome, OutcomeCode, Stamp};
+use crate::estimation::Solution;
+use crate::geometry::Motion;
+use crate::tracking::{Filter, FilterSettings, TrackOutcome};
+
+/// What one frame did to the track.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrameTrack {
+    /// What became of the frame in the filter; none without a filter, or when the frame is not of this camera or
+    /// has no time.
+    pub outcome: Option<TrackOutcome>,
+    /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; none
+    /// without a confirmed track, or when the frame came late.
+    pub motion: Option<Motion>,
+    /// The frame's pose is one of two that fit the image alike, and the track has chosen it.
+    pub has_chosen: bool,
+}
+
+impl FrameTrack {
+    /// Returns the code of the status message.
+    #[must_use]
+    pub fn code(&self) -> TrackCode {
+        match self.outcome {
+            Some(TrackOutcome::Duplicate { .. } | TrackOutcome::Late { .. }) => {
+                TrackCode::OutOfOrder
+            }
+            Some(TrackOutcome::Gated { .. }) => TrackCode::Gated,
+            Some(TrackOutcome::Updated { .. } | TrackOutcome::Acquired) => TrackCode::Updated,
+            Some(_) if self.motion.is_some() && self.has_chosen => TrackCode::Resolved,
+            Some(_) if self.motion.is_some() => TrackCode::Predicted,
+            Some(
+                TrackOutcome::Started(_)
+                | TrackOutcome::Confirming { .. }
+                | TrackOutcome::Coasting { .. },
+            ) => TrackCode::Candidate,
+            Some(_) | None => TrackCode::None,
+        }
+    }
+}
+
+/// The constants `TRACK_…` of `tanker_pose/msg/EstimatorStatus`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+#[allow(missing_docs)] // each is documented in msg/EstimatorStatus.msg
+pub enum TrackCode {
+    None = 0,
+    Candidate = 1,
+    Updated = 2,
+    Predicted = 3,
+    Gated = 4,
+    OutOfOrder = 5,
+    Resolved = 6,
+}
+
+impl TrackCode {
+    /// Every code, in the order of its number.
+    pub const ALL: [Self; 7] = [
+        Self::None,
+        Self::Candidate,
+        Self::Updated,
+        Self::Predicted,
+        Self::Gated,
+        Self::OutOfOrder,
+        Self::Resolved,
+    ];
+
+    /// Returns the number on the wire.
+    #[must_use]
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// Returns the constant's name without its prefix.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "NONE",
+            Self::Candidate => "CANDIDATE",
+            Self::Updated => "UPDATED",
+            Self::Predicted => "PREDICTED",
+            Self::Gated => "GATED",
+            Self::OutOfOrder => "OUT_OF_ORDER",
+            Self::Resolved => "RESOLVED",
+        }
+    }
+}
+
+/// The filter between the frames, or none.
+#[derive(Debug)]
+pub(super) struct Tracker(Option<Filter>);
+
+impl Tracker {
+    pub(super) fn new(settings: Option<FilterSettings>) -> Self {
+        Self(settings.and_then(|settings| Filter::new(settings).ok()))
+    }
+
+    /// Takes settings for the next frame on; the track stays.
+    pub(super) fn set_settings(&mut self, settings: Option<FilterSettings>) {
+        match (&mut self.0, settings) {
+            (Some(filter), Some(settings)) => {
+                if *filter.settings() != settings && filter.set_settings(settings).is_err() {
+                    self.0 = None;
+                }
+            }
+            _ => *self = Self::new(settings),
+        }
+    }
+
+    pub(super) fn reset(&mut self) {
+        if let Some(filter) = &mut self.0 {
+            filter.reset();
+        }
+    }
+
+    /// Returns the attitude that the track expects; none without a confirmed one that reaches so far.
+    pub(super) fn expected_rotation(&self, stamp: Stamp) -> Option<Rotation3<f64>> {
+        let motion = self.0.as_ref()?.predict(stamp.nanoseconds()).ok()?;
+        Some(motion.b_from_a.rotation.to_rotation_matrix())
+    }
+
+    /// Returns which of two poses of one image is the tanker's: the one within the gate, when the other is not.
+    ///
+    /// None without a confirmed track, and when the track contradicts both or neither.
+    pub(super) fn choice(&self, stamp: Stamp, both: &[Solution; 2]) -> Option<usize> {
+        let filter = self.0.as_ref()?;
+        let agrees = |solution: &Solution| {
+            let (pose, covariance) = (&solution.camera_from_tanker, &solution.covariance);
+            let squared = filter.innovation_squared(stamp.nanoseconds(), pose, covariance);
+            squared.ok().map(|squared| squared <= filter.gate_limit())
+        };
+        match (agrees(&both[0])?, agrees(&both[1])?) {
+            (true, false) => Some(0),
+            (false, true) => Some(1),
+            _ => None,
+        }
+    }
+
+    /// Tells the filter of a frame, and enters what came of it in the outcome.
+    pub(super) fn follow(&mut self, stamp: Stamp, frame: &mut FrameOutcome) {
+        let Some(filter) = &mut self.0 else {
+            return;
+        };
+        // The header of such a frame says nothing that could be believed.
+        if matches!(
+            frame.code(),
+            OutcomeCode::ZeroStamp
+                | OutcomeCode::NoCameraInfo
+                | OutcomeCode::InvalidCameraInfo
+                | OutcomeCode::FrameMismatch
+        ) {
+            return;
+        }
+        let stamp_ns = stamp.nanoseconds();
+        let outcome = match &frame.result {
+            // Chosen by the track, it would only tell the track what that already believes.
+            Ok(solution) if !frame.track.has_chosen => {
+                filter.update(stamp_ns, &solution.camera_from_tanker, &solution.covariance)
+            }
+            _ => filter.miss(stamp_ns),
+        };
+        frame.track.outcome = Some(outcome);
+        frame.track.motion = match outcome {
+            TrackOutcome::Duplicate { .. } | TrackOutcome::Late { .. } => None,
+            _ => filter.predict(stamp_ns).ok(),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_those_of_the_message_definition() {
+        let definition = include_str!("../../msg/EstimatorStatus.msg");
+        let constants: Vec<(&str, u8)> = definition
+            .lines()
+            .filter_map(|line| {
+                let (name, value) = line
+                    .split('#')
+                    .next()?
+                    .strip_prefix("uint8 TRACK_")?
+                    .split_once('=')?;
+                Some((name.trim(), value.trim().parse().ok()?))
+            })
+            .collect();
+        let codes: Vec<_> = TrackCode::ALL
+            .iter()
+            .map(|code| (code.name(), code.number()))
+            .collect();
+        assert_eq!(constants, codes);
+    }
+}
