@@ -6,7 +6,7 @@
 //! parameters, qos_overrides          parameters while the node runs, behind its services
 //! clock                              the node's time, the system's or a simulation's
 //! participant, leave                 into the graph, and out of it
-//! service, rtps                      services, and what of the wire protocol is written here
+//! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
@@ -32,6 +32,7 @@ pub mod parameter_file;
 pub mod parameters;
 pub mod participant;
 pub mod qos_overrides;
+pub mod reset;
 pub mod rtps;
 pub mod service;
 pub mod start_values;

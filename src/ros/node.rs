@@ -22,6 +22,7 @@ use super::participant::{
     EndpointError, OpenError, QosProfile, RosNode, Subscription, reliable, sensor_data,
 };
 use super::qos_overrides::{Endpoint, QosOverrides, Role};
+use super::reset::ResetService;
 use super::start_values::{StartParameterError, start_values};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
@@ -131,14 +132,16 @@ pub fn run_until(
             // Parameters last: who finds the services finds the topics too.
             Ok((
                 service,
+                ResetService::open(&mut ros)?,
                 ParameterServices::open(&mut ros, &parameters, &clock)?,
             ))
         })
-        .map(|(mut service, parameter_services)| {
+        .map(|(mut service, (reset, resets), parameter_services)| {
             introduce(&ros, environment, &map, &configuration);
             warn_of_too_small_map(&configuration, &map);
             let update = || Configuration::from(&parameters.snapshot());
-            smol::block_on(service.serve(&mut ros, stop, changes, update, &mut sim_time));
+            smol::block_on(service.serve(&mut ros, stop, (changes, resets), update, &mut sim_time));
+            reset.close();
             parameter_services.close();
         });
     sim_time.close();
@@ -288,7 +291,7 @@ impl Service {
         &mut self,
         ros: &mut RosNode,
         stop: impl Future<Output = ()>,
-        changes: smol::channel::Receiver<()>,
+        (changes, resets): (smol::channel::Receiver<()>, smol::channel::Receiver<()>),
         update: impl Fn() -> Configuration,
         sim_time: &mut SimTime,
     ) {
@@ -296,8 +299,8 @@ impl Service {
         let camera_infos = self.camera_info.async_stream();
         let (detections, topic) = (self.detections.stream(), self.topic);
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        let (stop, changes) = (stop.fuse(), changes.fuse());
-        pin_mut!(camera_infos, detections, seconds, changes, stop);
+        let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
+        pin_mut!(camera_infos, detections, seconds, changes, resets, stop);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
@@ -310,6 +313,7 @@ impl Service {
                         log::error!("use_sim_time has no effect: {error}");
                     }
                 },
+                () = resets.select_next_some() => estimator.on_reset(),
                 sample = camera_infos.select_next_some() => match sample {
                     Ok((message, _)) => estimator.on_camera_info(&message),
                     Err(error) => estimator.on_undecodable(CAMERA_INFO, &error),
