@@ -9,6 +9,10 @@ use crate::tracking::FilterSettings;
 
 /// Everything that the parameters say, in the types that the node works with.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches that are independent of each other"
+)]
 pub struct Configuration {
     /// What the processing of a frame depends on.
     pub settings: Settings,
@@ -20,6 +24,8 @@ pub struct Configuration {
     pub publish_tf: bool,
     /// Whether time comes from /clock.
     pub use_sim_time: bool,
+    /// Whether others manage the node's state.
+    pub lifecycle: bool,
     /// Whether to publish what `RViz` and Foxglove can draw.
     pub publish_markers: bool,
     /// Where detections come from.
@@ -55,6 +61,7 @@ impl From<&Parameters> for Configuration {
             tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
             publish_tf: parameters.bool("publish_tf"),
             use_sim_time: parameters.bool("use_sim_time"),
+            lifecycle: parameters.bool("lifecycle"),
             publish_markers: parameters.bool("publish_markers"),
             input: match parameters.text("input") {
                 "detections" => Input::Detections,
@@ -199,6 +206,7 @@ mod tests {
             ("tanker_frame_id", String("kc46".into())),
             ("publish_tf", Bool(true)),
             ("use_sim_time", Bool(true)),
+            ("lifecycle", Bool(true)),
             ("publish_markers", Bool(true)),
             ("input", String("apriltags".into())),
             ("max_hamming", Integer(2)),
@@ -225,7 +233,7 @@ mod tests {
             ("fin6", "kc46")
         );
         assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
-        assert!(found.use_sim_time);
+        assert!(found.use_sim_time && found.lifecycle);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
         assert_eq!(estimator.initialisation, Initialisation::Global);

@@ -349,6 +349,13 @@ pub const TABLE: &[ParameterSpec] = &[
         description: "consistent poses that make a track; before that there is no odometry",
     },
     ParameterSpec {
+        name: "lifecycle",
+        kind: Kind::Bool { default: false },
+        read_only: true,
+        description: "be a managed node: it loads the marker map and opens its topics when it is configured, \
+                      and answers detections while it is active",
+    },
+    ParameterSpec {
         name: "use_sim_time",
         kind: Kind::Bool { default: false },
         read_only: false,

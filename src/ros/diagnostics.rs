@@ -56,6 +56,8 @@ pub struct Tally {
     tracks: [u64; TrackCode::ALL.len()],
     /// Camera infos received.
     pub camera_infos: u64,
+    /// Detections that came while the node was not active, and were not looked at.
+    pub unanswered: u64,
     /// Samples that could not be decoded.
     pub undecodable: u64,
     /// Messages not sent because a subscriber did not keep up, or for an error.
@@ -217,6 +219,7 @@ fn values(
             situation.last_refusal.unwrap_or_default().to_owned(),
         ),
         ("publishers".to_owned(), situation.publishers.to_string()),
+        ("unanswered".to_owned(), tally.unanswered.to_string()),
         ("undecodable".to_owned(), tally.undecodable.to_string()),
         ("dropped".to_owned(), tally.dropped.to_string()),
     ];

@@ -92,6 +92,7 @@ pub struct Estimator {
     outputs: Outputs,
     clock: NodeClock,
     node: String,
+    active: bool,
     camera: CameraState,
     tally: Tally,
     reporter: Reporter,
@@ -108,8 +109,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Returns an estimator that has not seen a message yet, for the node and marker map of
-    /// these names.
+    /// Returns an estimator that has not seen a message yet and is not active, for the node of this name.
     #[must_use]
     pub fn new(
         pipeline: Pipeline,
@@ -124,6 +124,7 @@ impl Estimator {
             outputs,
             clock,
             node: node.to_owned(),
+            active: false,
             camera: CameraState::Missing,
             tally: Tally::default(),
             reporter: Reporter::default(),
@@ -140,6 +141,17 @@ impl Estimator {
         }
     }
 
+    /// Begins or ends answers. While it is not active, camera infos still count and detections are only counted.
+    pub const fn set_active(&mut self, on: bool) {
+        self.active = on;
+    }
+
+    /// Returns its outputs, for another estimator.
+    #[must_use]
+    pub fn into_outputs(self) -> Outputs {
+        self.outputs
+    }
+
     /// Takes a camera info.
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
@@ -154,6 +166,10 @@ impl Estimator {
 
     /// Takes the detections of an image; publishes what becomes of them.
     pub fn on_detections(&mut self, message: InputMessage) {
+        if !self.active {
+            self.tally.unanswered += 1;
+            return;
+        }
         let begin = Instant::now();
         let sighting = self.reader.read(message);
         let header = sighting.header;

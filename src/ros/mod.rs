@@ -6,11 +6,12 @@
 //! parameters, qos_overrides          parameters while the node runs, behind its services
 //! clock                              the node's time, the system's or a simulation's
 //! participant, leave                 into the graph, and out of it
+//! lifecycle                          a managed node's states, behind their services
 //! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
-//! node                               all of it together, until a signal or a tool ends it
+//! node, serve                        all of it together, until a signal or a tool ends it
 //! ```
 //!
 //! Tools that talk ROS start from [`participant::RosNode::open`].
@@ -23,6 +24,7 @@ pub mod environment;
 pub mod estimator;
 pub mod input;
 pub mod leave;
+pub mod lifecycle;
 pub mod logging;
 pub mod messages;
 pub mod names;
@@ -34,5 +36,6 @@ pub mod participant;
 pub mod qos_overrides;
 pub mod reset;
 pub mod rtps;
+mod serve;
 pub mod service;
 pub mod start_values;

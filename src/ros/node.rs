@@ -2,14 +2,13 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use async_signal::{Signal, Signals};
-use futures::{FutureExt, StreamExt, pin_mut, select_biased};
+use futures::StreamExt;
 use ros2_client::NodeOptions;
 
 use super::arguments::Arguments;
-use super::clock::{NodeClock, SimTime};
+use super::clock::NodeClock;
 use super::environment::Environment;
 use super::estimator::{Estimator, Output, Outputs};
 pub use super::input::{DETECTIONS, FEATURE_POINTS};
@@ -23,6 +22,7 @@ use super::participant::{
 };
 use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
+use super::serve::Server;
 use super::start_values::{StartParameterError, start_values};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
@@ -113,7 +113,12 @@ pub fn run_until(
     let qos = QosOverrides::new(endpoints(&names)?);
     let start = start_values(arguments, &names.fully_qualified(), qos)?;
     let configuration = Configuration::from(&start.parameters);
-    let map = Arc::new(marker_map(&configuration.marker_map)?);
+    // A managed node reads its map when it is configured.
+    let map = if configuration.lifecycle {
+        None
+    } else {
+        Some(marker_map(&configuration.marker_map)?)
+    };
 
     let options = NodeOptions::new().start_parameter_services(false);
     let mut ros = RosNode::open(NODE_NAME, arguments, environment, options)?;
@@ -124,27 +129,25 @@ pub fn run_until(
     ros.override_qos(start.qos.clone());
     let (parameters, changes) = SharedParameters::new(start.parameters, &start.qos);
     let clock = NodeClock::default();
-    let mut sim_time = SimTime::new(clock.clone());
-    let served = sim_time
-        .follow(&mut ros, configuration.use_sim_time)
-        .and_then(|()| Service::open(&mut ros, &configuration, &map, &clock))
-        .and_then(|service| {
-            // Parameters last: who finds the services finds the topics too.
-            Ok((
-                service,
-                ResetService::open(&mut ros)?,
-                ParameterServices::open(&mut ros, &parameters, &clock)?,
-            ))
+    let mut server = Server::new(&mut ros, environment, &parameters, &clock);
+    let served = server
+        .follow_clock(configuration.use_sim_time)
+        .and_then(|()| match map {
+            Some(map) => server.start(&configuration, map),
+            None => server.start_managed(),
         })
-        .map(|(mut service, (reset, resets), parameter_services)| {
-            introduce(&ros, environment, &map, &configuration);
-            warn_of_too_small_map(&configuration, &map);
-            let update = || Configuration::from(&parameters.snapshot());
-            smol::block_on(service.serve(&mut ros, stop, (changes, resets), update, &mut sim_time));
+        // Parameters last: who finds the services finds the topics too.
+        .and_then(|()| {
+            let reset = ResetService::open(server.ros())?;
+            let services = ParameterServices::open(server.ros(), &parameters, &clock)?;
+            Ok((reset, services))
+        })
+        .map(|((reset, resets), parameter_services)| {
+            smol::block_on(server.serve(stop, changes, resets));
             reset.close();
             parameter_services.close();
         });
-    sim_time.close();
+    server.close();
     if served.is_ok() {
         log::info!("leaving");
     }
@@ -173,7 +176,7 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
 }
 
 /// Returns the shipped map of this name, or the one in the file at this path.
-fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
+pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     if let Some(map) = MarkerMap::shipped(name) {
         return Ok(map);
     }
@@ -184,7 +187,7 @@ fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
 }
 
 /// Says at the start what would refuse every frame.
-fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
+pub(super) fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
     let estimator = &configuration.settings.estimator;
     let need = estimator
         .min_points
@@ -197,7 +200,7 @@ fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
     }
 }
 
-fn introduce(
+pub(super) fn introduce(
     ros: &RosNode,
     environment: &Environment,
     map: &MarkerMap,
@@ -229,106 +232,63 @@ fn introduce(
     );
 }
 
-/// The open topics, and the estimator between them.
-struct Service {
-    detections: InputSubscription,
-    camera_info: Subscription<CameraInfo>,
-    estimator: Estimator,
+/// The topics that the node listens to.
+pub(super) struct Inputs {
+    pub(super) detections: InputSubscription,
+    pub(super) camera_info: Subscription<CameraInfo>,
     /// That of the detections.
-    topic: &'static str,
+    pub(super) topic: &'static str,
 }
 
-impl Service {
-    fn open(
-        ros: &mut RosNode,
-        configuration: &Configuration,
-        map: &Arc<MarkerMap>,
-        clock: &NodeClock,
-    ) -> Result<Self, EndpointError> {
-        let transform = if configuration.publish_tf {
-            Some(output(ros, "/tf", &TRANSFORMS)?)
-        } else {
-            None
-        };
-        let markers = if configuration.publish_markers {
-            Some(output(ros, MARKERS, &OUTPUT)?)
-        } else {
-            None
-        };
-        let outputs = Outputs {
-            pose: output(ros, POSE, &OUTPUT)?,
-            odometry: output(ros, ODOMETRY, &OUTPUT)?,
-            tanker_frame_id: configuration.tanker_frame_id.clone(),
-            status: output(ros, STATUS, &OUTPUT)?,
-            transform,
-            markers,
-            diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
-        };
-        let input = configuration.input;
-        let reader = InputReader {
-            input,
-            map: Arc::clone(map),
-            max_hamming: configuration.max_hamming,
-        };
-        let pipeline = Pipeline::new(configuration.settings.clone(), Arc::clone(map));
-        Ok(Self {
-            // Inputs last: what arrives can be answered.
-            camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
-            detections: InputSubscription::open(ros, input, &INPUT)?,
-            estimator: Estimator::new(
-                pipeline,
-                reader,
-                outputs,
-                clock.clone(),
-                ros.names().base_name(),
-            ),
-            topic: input.topic(),
-        })
-    }
+/// Opens the node's topics.
+pub(super) fn open_topics(
+    ros: &mut RosNode,
+    configuration: &Configuration,
+) -> Result<(Inputs, Outputs), EndpointError> {
+    let transform = if configuration.publish_tf {
+        Some(output(ros, "/tf", &TRANSFORMS)?)
+    } else {
+        None
+    };
+    let markers = if configuration.publish_markers {
+        Some(output(ros, MARKERS, &OUTPUT)?)
+    } else {
+        None
+    };
+    let outputs = Outputs {
+        pose: output(ros, POSE, &OUTPUT)?,
+        odometry: output(ros, ODOMETRY, &OUTPUT)?,
+        tanker_frame_id: configuration.tanker_frame_id.clone(),
+        status: output(ros, STATUS, &OUTPUT)?,
+        transform,
+        markers,
+        diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
+    };
+    // Inputs last: what arrives can be answered.
+    let inputs = Inputs {
+        camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
+        detections: InputSubscription::open(ros, configuration.input, &INPUT)?,
+        topic: configuration.input.topic(),
+    };
+    Ok((inputs, outputs))
+}
 
-    /// Feeds the estimator until `stop` ends.
-    async fn serve(
-        &mut self,
-        ros: &mut RosNode,
-        stop: impl Future<Output = ()>,
-        (changes, resets): (smol::channel::Receiver<()>, smol::channel::Receiver<()>),
-        update: impl Fn() -> Configuration,
-        sim_time: &mut SimTime,
-    ) {
-        let estimator = &mut self.estimator;
-        let camera_infos = self.camera_info.async_stream();
-        let (detections, topic) = (self.detections.stream(), self.topic);
-        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
-        pin_mut!(camera_infos, detections, seconds, changes, resets, stop);
-        loop {
-            // In this order when several are ready: a camera info or a parameter that came before a
-            // frame counts for it.
-            select_biased! {
-                () = stop => break,
-                () = changes.select_next_some() => {
-                    let configuration = update();
-                    estimator.on_settings(configuration.settings);
-                    if let Err(error) = sim_time.follow(ros, configuration.use_sim_time) {
-                        log::error!("use_sim_time has no effect: {error}");
-                    }
-                },
-                () = resets.select_next_some() => estimator.on_reset(),
-                sample = camera_infos.select_next_some() => match sample {
-                    Ok((message, _)) => estimator.on_camera_info(&message),
-                    Err(error) => estimator.on_undecodable(CAMERA_INFO, &error),
-                },
-                _ = seconds.select_next_some() => {
-                    let publishers = ros.publisher_count(topic).unwrap_or(0);
-                    estimator.on_second(publishers, Instant::now());
-                },
-                sample = detections.select_next_some() => match sample {
-                    Ok(message) => estimator.on_detections(message),
-                    Err(error) => estimator.on_undecodable(topic, &error),
-                },
-            }
-        }
-    }
+/// Returns what processes the messages, for this configuration and map.
+pub(super) fn estimator(
+    ros: &RosNode,
+    configuration: &Configuration,
+    map: &Arc<MarkerMap>,
+    outputs: Outputs,
+    clock: &NodeClock,
+) -> Estimator {
+    let reader = InputReader {
+        input: configuration.input,
+        map: Arc::clone(map),
+        max_hamming: configuration.max_hamming,
+    };
+    let pipeline = Pipeline::new(configuration.settings.clone(), Arc::clone(map));
+    let name = ros.names().base_name();
+    Estimator::new(pipeline, reader, outputs, clock.clone(), name)
 }
 
 fn output<M: Message>(

@@ -22,12 +22,12 @@ impl ResetService {
             // Before the answer: a frame sent after it finds the request waiting, and resets come before
             // frames. A full channel holds a request that will do.
             let _ = requests.try_send(());
-            TriggerResponse {
+            std::future::ready(TriggerResponse {
                 success: true,
                 message:
                     "the track and the last attitude are forgotten: the next frame is the first"
                         .to_owned(),
-            }
+            })
         });
         Ok((Self(smol::spawn(serve)), resets))
     }

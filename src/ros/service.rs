@@ -105,11 +105,12 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
         })
     }
 
-    /// Answers every request, for ever.
-    pub async fn serve<Response: Serialize + Default>(
-        self,
-        mut answer: impl FnMut(Request) -> Response,
-    ) {
+    /// Answers every request, one after the other, for ever.
+    pub async fn serve<Response, Answer>(self, mut answer: impl FnMut(Request) -> Answer)
+    where
+        Response: Serialize + Default,
+        Answer: Future<Output = Response>,
+    {
         let Self {
             name,
             requests,
@@ -121,7 +122,7 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
         loop {
             match requests.select_next_some().await {
                 Ok((request, info)) => {
-                    let response = answer(request);
+                    let response = answer(request).await;
                     if let Err(error) = replies.send(identity(&info), &response).await {
                         log::warn!("service {name}: {error}");
                     }

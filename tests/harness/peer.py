@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+import rclpy.node
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -48,6 +49,14 @@ class Peer:
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+    def add_node(self, node: rclpy.node.Node) -> None:
+        """Spins another node of this context too."""
+        self._executor.add_node(node)
+
+    def remove_node(self, node: rclpy.node.Node) -> None:
+        """Spins it no longer."""
+        self._executor.remove_node(node)
 
     def collect(
         self, message_type: type, topic: str, qos: QoSProfile = RELIABLE, *, raw: bool = False

@@ -21,7 +21,15 @@ from harness.estimator import Estimator
 from harness.peer import Peer
 
 NODE = "/tanker_pose"
-FIXED = {"marker_map", "tanker_frame_id", "publish_tf"}
+FIXED = {
+    "marker_map",
+    "tanker_frame_id",
+    "publish_tf",
+    "publish_markers",
+    "input",
+    "max_hamming",
+    "lifecycle",
+}
 QOS = "qos_overrides./pose.publisher"
 
 

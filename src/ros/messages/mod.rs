@@ -8,12 +8,14 @@ use serde::{Deserialize, Serialize};
 
 mod detectors;
 mod estimator_status;
+mod lifecycle;
 mod parameters;
 mod standard;
 mod visualization;
 
 pub use detectors::*;
 pub use estimator_status::EstimatorStatus;
+pub use lifecycle::*;
 pub use parameters::*;
 pub use standard::*;
 pub use visualization::*;
@@ -64,6 +66,7 @@ ros_message!(
     "sensor_msgs" / CameraInfo,
     "tf2_msgs" / TFMessage,
     "diagnostic_msgs" / DiagnosticArray,
+    "lifecycle_msgs" / TransitionEvent,
     "rcl_interfaces" / ParameterEvent,
     "rosgraph_msgs" / Clock,
     "visualization_msgs" / MarkerArray,

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use futures::future::join_all;
+use futures::future::{join_all, ready};
 use futures::{FutureExt, future::BoxFuture};
 use ros2_client::Publisher;
 use serde::Serialize;
@@ -100,7 +100,7 @@ fn service<Request, Response>(
     ros: &mut RosNode,
     name: &str,
     service_type: &str,
-    answer: impl FnMut(Request) -> Response + Send + 'static,
+    mut answer: impl FnMut(Request) -> Response + Send + 'static,
 ) -> Result<BoxFuture<'static, ()>, EndpointError>
 where
     Request: DeserializeOwned + Send + Sync + 'static,
@@ -108,7 +108,7 @@ where
 {
     let name = format!("{}/{name}", ros.names().fully_qualified());
     let service = Service::open(ros, &name, (PACKAGE, service_type))?;
-    Ok(service.serve(answer).boxed())
+    Ok(service.serve(move |request| ready(answer(request))).boxed())
 }
 
 /// Where others hear of changes.

@@ -1,0 +1,145 @@
+//! A managed node: its state, the services by which others see and change it, and the events that tell of changes.
+//!
+//! The services only pass on what is asked; the node's own loop carries it out between two messages, and the answer
+//! of `~/change_state` waits for that.
+
+mod services;
+mod states;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ros2_client::Publisher;
+
+use super::clock::NodeClock;
+use super::messages::TransitionEvent;
+use super::participant::{EndpointError, QosProfile, RosNode, reliable};
+use crate::text::clip;
+pub use states::{GRAPH, State, Transition, WorkResult};
+
+/// As rcl has it: its default for publishers.
+const EVENTS: QosProfile = reliable(10);
+
+/// A request for a transition that waits for its answer.
+#[derive(Debug)]
+pub struct Request {
+    id: u8,
+    label: String,
+    answer: smol::channel::Sender<bool>,
+}
+
+/// The state of a managed node, with its services open until they are closed.
+pub struct Lifecycle {
+    state: SharedState,
+    events: Publisher<TransitionEvent>,
+    clock: NodeClock,
+    services: smol::Task<()>,
+}
+
+impl Lifecycle {
+    /// Opens the services of an unconfigured node; the requests come out of the channel.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the middleware refuses.
+    pub fn open(
+        ros: &mut RosNode,
+        clock: &NodeClock,
+    ) -> Result<(Self, smol::channel::Receiver<Request>), EndpointError> {
+        let state = SharedState::default();
+        // One place is enough: the service waits for each answer.
+        let (sender, requests) = smol::channel::bounded(1);
+        let lifecycle = Self {
+            events: ros.publisher("~/transition_event", &EVENTS)?,
+            clock: clock.clone(),
+            services: services::open(ros, &state, sender)?,
+            state,
+        };
+        Ok((lifecycle, requests))
+    }
+
+    /// Makes the transition that is asked for and answers whether it was made. `work` does what the state that it is
+    /// given is there for.
+    pub fn carry_out(&self, request: &Request, mut work: impl FnMut(State) -> WorkResult) {
+        let before = self.state.get();
+        let success = self
+            .state
+            .get()
+            .asked(request.id, &request.label)
+            .is_some_and(|transition| self.make(transition, &mut work));
+        let after = self.state.get();
+        if success {
+            log::info!("{} after {}", after.label(), before.label());
+        } else {
+            log::error!(
+                "transition {} {:?} was asked for and not made: the node was {} and is {}",
+                request.id,
+                clip(&request.label),
+                before.label(),
+                after.label()
+            );
+        }
+        // Nobody waits for it once the services are closed.
+        let _ = request.answer.try_send(success);
+    }
+
+    /// Steps until a state lasts; returns whether the first work was done.
+    fn make(
+        &self,
+        transition: &'static Transition,
+        work: &mut impl FnMut(State) -> WorkResult,
+    ) -> bool {
+        self.step(transition);
+        let result = work(transition.goal);
+        let mut next = transition.goal.after(result);
+        while let Some(transition) = next {
+            self.step(transition);
+            next = match transition.goal {
+                State::ErrorProcessing => transition.goal.after(work(transition.goal)),
+                _ => None,
+            };
+        }
+        result == WorkResult::Success
+    }
+
+    fn step(&self, transition: &Transition) {
+        self.state.set(transition.goal);
+        let now = self.clock.now();
+        let seconds = u64::try_from(now.sec).unwrap_or(0);
+        let event = TransitionEvent {
+            timestamp: seconds * 1_000_000_000 + u64::from(now.nanosec),
+            ..services::event(transition)
+        };
+        if let Err(error) = self.events.publish(event) {
+            log::warn!("a change of state is not told on ~/transition_event: {error}");
+        }
+    }
+
+    /// Ends the services, which have to be gone before the node is.
+    pub fn close(self) {
+        smol::block_on(self.services.cancel());
+    }
+}
+
+/// The state, shared with the services.
+#[derive(Debug, Clone)]
+struct SharedState(Arc<Mutex<State>>);
+
+impl Default for SharedState {
+    fn default() -> Self {
+        Self(Arc::new(Mutex::new(State::Unconfigured)))
+    }
+}
+
+impl SharedState {
+    fn get(&self) -> State {
+        *self.lock()
+    }
+
+    fn set(&self, state: State) {
+        *self.lock() = state;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A state is replaced as a whole: a panic elsewhere cannot leave half of one behind.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,131 @@
+//! The five services of a managed node.
+
+use futures::future::{BoxFuture, join_all, ready};
+use futures::{FutureExt, TryFutureExt};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::states::{GRAPH, State, Transition};
+use super::{Request, SharedState};
+use crate::ros::messages::{
+    ChangeStateRequest, ChangeStateResponse, EmptyRequest, LifecycleState, LifecycleTransition,
+    TransitionDescription, TransitionEvent,
+};
+use crate::ros::participant::{EndpointError, RosNode};
+use crate::ros::service::Service;
+
+const PACKAGE: &str = "lifecycle_msgs";
+
+/// Opens the services; what they are asked to change goes to `requests`.
+pub(super) fn open(
+    ros: &mut RosNode,
+    state: &SharedState,
+    requests: smol::channel::Sender<Request>,
+) -> Result<smol::Task<()>, EndpointError> {
+    let shared = || state.clone();
+    let (current, available) = (shared(), shared());
+    let services = [
+        service(ros, "get_state", "GetState", move |_: EmptyRequest| {
+            ready(state_message(current.get()))
+        })?,
+        service(
+            ros,
+            "get_available_states",
+            "GetAvailableStates",
+            |_: EmptyRequest| ready(State::ALL.map(state_message).to_vec()),
+        )?,
+        service(
+            ros,
+            "get_available_transitions",
+            "GetAvailableTransitions",
+            move |_: EmptyRequest| ready(descriptions(available.get().transitions())),
+        )?,
+        service(
+            ros,
+            "get_transition_graph",
+            "GetAvailableTransitions",
+            |_: EmptyRequest| ready(descriptions(GRAPH.iter())),
+        )?,
+        service(
+            ros,
+            "change_state",
+            "ChangeState",
+            move |request: ChangeStateRequest| ask(requests.clone(), request.transition),
+        )?,
+    ];
+    Ok(smol::spawn(join_all(services).map(drop)))
+}
+
+/// Returns the work of one service of the node.
+fn service<Request, Response, Answer>(
+    ros: &mut RosNode,
+    name: &str,
+    service_type: &str,
+    answer: impl FnMut(Request) -> Answer + Send + 'static,
+) -> Result<BoxFuture<'static, ()>, EndpointError>
+where
+    Request: DeserializeOwned + Send + Sync + 'static,
+    Response: Serialize + Default + Send + Sync + 'static,
+    Answer: Future<Output = Response> + Send + 'static,
+{
+    let name = format!("{}/{name}", ros.names().fully_qualified());
+    let service = Service::open(ros, &name, (PACKAGE, service_type))?;
+    Ok(service.serve(answer).boxed())
+}
+
+/// Asks the node for a transition, and returns what came of it.
+async fn ask(
+    requests: smol::channel::Sender<Request>,
+    transition: LifecycleTransition,
+) -> ChangeStateResponse {
+    let (answer, answers) = smol::channel::bounded(1);
+    let request = Request {
+        id: transition.id,
+        label: transition.label,
+        answer,
+    };
+    let success = requests
+        .send(request)
+        .map_err(drop)
+        .and_then(|()| answers.recv().map_err(drop))
+        .await
+        // A node that is leaving makes no more transitions.
+        .unwrap_or(false);
+    ChangeStateResponse { success }
+}
+
+fn state_message(state: State) -> LifecycleState {
+    LifecycleState {
+        id: state.id(),
+        label: state.label().to_owned(),
+    }
+}
+
+fn descriptions<'a>(
+    transitions: impl Iterator<Item = &'a Transition>,
+) -> Vec<TransitionDescription> {
+    transitions
+        .map(|transition| TransitionDescription {
+            transition: transition_message(transition),
+            start_state: state_message(transition.start),
+            goal_state: state_message(transition.goal),
+        })
+        .collect()
+}
+
+fn transition_message(transition: &Transition) -> LifecycleTransition {
+    LifecycleTransition {
+        id: transition.id,
+        label: transition.label.to_owned(),
+    }
+}
+
+/// Returns the event that tells of a transition, without its time.
+pub(super) fn event(transition: &Transition) -> TransitionEvent {
+    TransitionEvent {
+        timestamp: 0,
+        transition: transition_message(transition),
+        start_state: state_message(transition.start),
+        goal_state: state_message(transition.goal),
+    }
+}

@@ -1,0 +1,243 @@
+//! The node's loop: messages to the estimator, changed parameters, and, if the node is managed, its transitions.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use futures::{FutureExt, StreamExt, pin_mut, select_biased};
+
+use super::clock::{NodeClock, SimTime};
+use super::environment::Environment;
+use super::estimator::{Estimator, Outputs};
+use super::lifecycle::{Lifecycle, Request, State, WorkResult};
+use super::node::{
+    CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
+    warn_of_too_small_map,
+};
+use super::parameters::SharedParameters;
+use super::participant::{EndpointError, RosNode};
+use crate::config::Configuration;
+use crate::target::MarkerMap;
+
+/// What stands between the topics.
+enum Work {
+    /// Nothing, and the topics are not open.
+    Closed,
+    /// Nothing, though the topics are open: peers do not notice that single endpoints have gone, so these stay.
+    Idle(Box<Outputs>),
+    /// The estimator.
+    Ready(Box<Estimator>),
+}
+
+/// What the node's loop works with.
+///
+/// The fields stand in the order in which they have to be dropped.
+pub(super) struct Server<'a> {
+    inputs: Option<Inputs>,
+    work: Work,
+    sim_time: SimTime,
+    lifecycle: Option<Lifecycle>,
+    requests: Option<smol::channel::Receiver<Request>>,
+    clock: NodeClock,
+    parameters: SharedParameters,
+    environment: &'a Environment,
+    ros: &'a mut RosNode,
+}
+
+impl<'a> Server<'a> {
+    /// Returns a server that has nothing to do yet.
+    pub(super) fn new(
+        ros: &'a mut RosNode,
+        environment: &'a Environment,
+        parameters: &SharedParameters,
+        clock: &NodeClock,
+    ) -> Self {
+        Self {
+            inputs: None,
+            work: Work::Closed,
+            sim_time: SimTime::new(clock.clone()),
+            lifecycle: None,
+            requests: None,
+            clock: clock.clone(),
+            parameters: parameters.clone(),
+            environment,
+            ros,
+        }
+    }
+
+    pub(super) fn ros(&mut self) -> &mut RosNode {
+        self.ros
+    }
+
+    /// Takes the time from `/clock` from now on, or no longer.
+    pub(super) fn follow_clock(&mut self, on: bool) -> Result<(), EndpointError> {
+        self.sim_time.follow(self.ros, on)
+    }
+
+    /// Opens the topics and begins to answer.
+    pub(super) fn start(
+        &mut self,
+        configuration: &Configuration,
+        map: MarkerMap,
+    ) -> Result<(), EndpointError> {
+        self.configure(configuration, map)?;
+        self.activate(true);
+        Ok(())
+    }
+
+    /// Opens the services by which others configure the node.
+    pub(super) fn start_managed(&mut self) -> Result<(), EndpointError> {
+        let (lifecycle, requests) = Lifecycle::open(self.ros, &self.clock)?;
+        self.lifecycle = Some(lifecycle);
+        self.requests = Some(requests);
+        let name = self.ros.names().fully_qualified();
+        log::info!("{name} is unconfigured: it waits for {name}/change_state");
+        Ok(())
+    }
+
+    /// Works until `stop` ends.
+    pub(super) async fn serve(
+        &mut self,
+        stop: impl Future<Output = ()>,
+        changes: smol::channel::Receiver<()>,
+        resets: smol::channel::Receiver<()>,
+    ) {
+        let requests = self.requests.take().unwrap_or_else(no_requests).fuse();
+        let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
+        pin_mut!(stop, changes, resets, requests);
+        let inputs = loop {
+            if let Some(inputs) = self.inputs.take() {
+                break inputs;
+            }
+            select_biased! {
+                () = stop => return,
+                () = changes.select_next_some() => self.on_change(),
+                () = resets.select_next_some() => self.with(Estimator::on_reset),
+                request = requests.select_next_some() => self.on_request(&request),
+            }
+        };
+        let camera_infos = inputs.camera_info.async_stream();
+        let (detections, topic) = (inputs.detections.stream(), inputs.topic);
+        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
+        pin_mut!(camera_infos, detections, seconds);
+        loop {
+            // In this order when several are ready: a camera info or a parameter that came before a
+            // frame counts for it.
+            select_biased! {
+                () = stop => break,
+                () = changes.select_next_some() => self.on_change(),
+                () = resets.select_next_some() => self.with(Estimator::on_reset),
+                request = requests.select_next_some() => self.on_request(&request),
+                sample = camera_infos.select_next_some() => self.with(|estimator| match &sample {
+                    Ok((message, _)) => estimator.on_camera_info(message),
+                    Err(error) => estimator.on_undecodable(CAMERA_INFO, error),
+                }),
+                _ = seconds.select_next_some() => {
+                    let publishers = self.ros.publisher_count(topic).unwrap_or(0);
+                    self.with(|estimator| estimator.on_second(publishers, Instant::now()));
+                },
+                sample = detections.select_next_some() => self.with(|estimator| match sample {
+                    Ok(message) => estimator.on_detections(message),
+                    Err(error) => estimator.on_undecodable(topic, &error),
+                }),
+            }
+        }
+    }
+
+    /// Ends what runs in the background, which has to be gone before the node is.
+    pub(super) fn close(self) {
+        if let Some(lifecycle) = self.lifecycle {
+            lifecycle.close();
+        }
+        self.sim_time.close();
+    }
+
+    fn with(&mut self, act: impl FnOnce(&mut Estimator)) {
+        if let Work::Ready(estimator) = &mut self.work {
+            act(estimator);
+        }
+    }
+
+    fn on_change(&mut self) {
+        let configuration = Configuration::from(&self.parameters.snapshot());
+        if let Err(error) = self.follow_clock(configuration.use_sim_time) {
+            log::error!("use_sim_time has no effect: {error}");
+        }
+        self.with(|estimator| estimator.on_settings(configuration.settings));
+    }
+
+    fn on_request(&mut self, request: &Request) {
+        let Some(lifecycle) = self.lifecycle.take() else {
+            return;
+        };
+        lifecycle.carry_out(request, |state| self.work_of(state));
+        self.lifecycle = Some(lifecycle);
+    }
+
+    /// Does what a state between two lasting ones is there for.
+    fn work_of(&mut self, state: State) -> WorkResult {
+        match state {
+            State::Configuring => return self.configure_as_asked(),
+            State::Activating => self.activate(true),
+            State::Deactivating => self.activate(false),
+            _ => self.clean_up(),
+        }
+        WorkResult::Success
+    }
+
+    fn configure_as_asked(&mut self) -> WorkResult {
+        let configuration = Configuration::from(&self.parameters.snapshot());
+        let map = match marker_map(&configuration.marker_map) {
+            Ok(map) => map,
+            Err(error) => {
+                log::error!("cannot be configured: {error}");
+                return WorkResult::Failure;
+            }
+        };
+        match self.configure(&configuration, map) {
+            Ok(()) => WorkResult::Success,
+            Err(error) => {
+                log::error!("cannot be configured: {}", NodeError::from(error));
+                WorkResult::Error
+            }
+        }
+    }
+
+    fn configure(
+        &mut self,
+        configuration: &Configuration,
+        map: MarkerMap,
+    ) -> Result<(), EndpointError> {
+        self.clean_up();
+        let outputs = match std::mem::replace(&mut self.work, Work::Closed) {
+            Work::Idle(outputs) => *outputs,
+            Work::Closed | Work::Ready(_) => {
+                let (inputs, outputs) = open_topics(self.ros, configuration)?;
+                self.inputs = Some(inputs);
+                outputs
+            }
+        };
+        let map = Arc::new(map);
+        introduce(self.ros, self.environment, &map, configuration);
+        warn_of_too_small_map(configuration, &map);
+        let estimator = estimator(self.ros, configuration, &map, outputs, &self.clock);
+        self.work = Work::Ready(Box::new(estimator));
+        Ok(())
+    }
+
+    fn activate(&mut self, on: bool) {
+        self.with(|estimator| estimator.set_active(on));
+    }
+
+    /// Forgets the map, the camera and all that was counted.
+    fn clean_up(&mut self) {
+        self.work = match std::mem::replace(&mut self.work, Work::Closed) {
+            Work::Ready(estimator) => Work::Idle(Box::new(estimator.into_outputs())),
+            other => other,
+        };
+    }
+}
+
+/// Returns a channel that ends at once.
+fn no_requests() -> smol::channel::Receiver<Request> {
+    smol::channel::bounded(1).1
+}
