@@ -6,6 +6,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use futures::{StreamExt, pin_mut};
 use ros2_client::Subscription;
 
+use super::health::Jumps;
 use super::messages::{Clock, Time};
 use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, sensor_data};
@@ -19,14 +20,26 @@ const LATEST: QosProfile = sensor_data(1);
 #[derive(Debug, Clone, Default)]
 pub struct NodeClock {
     /// The simulated time while `use_sim_time` is set.
-    simulated: Arc<Mutex<Option<Time>>>,
+    simulated: Arc<Mutex<Option<Simulated>>>,
+}
+
+#[derive(Debug, Default)]
+struct Simulated {
+    /// None until a first one has come.
+    time: Option<Time>,
+    jumps: Jumps,
+    /// The last jump that nobody has asked for yet.
+    jump: Option<String>,
 }
 
 impl NodeClock {
     /// Returns the node's time; while it is simulated, zero until a first `/clock` has come, as in all of ROS.
     #[must_use]
     pub fn now(&self) -> Time {
-        self.lock().unwrap_or_else(system_time)
+        match &*self.lock() {
+            Some(simulated) => simulated.time.unwrap_or_default(),
+            None => system_time(),
+        }
     }
 
     /// Begins or ends simulated time; false when that changes nothing.
@@ -34,7 +47,7 @@ impl NodeClock {
         let mut simulated = self.lock();
         let changes = on != simulated.is_some();
         if changes {
-            *simulated = on.then(Time::default);
+            *simulated = on.then(Simulated::default);
         }
         changes
     }
@@ -42,12 +55,24 @@ impl NodeClock {
     /// Takes a simulated time, if that is wanted.
     fn set(&self, time: Time) {
         if let Some(simulated) = self.lock().as_mut() {
-            *simulated = time;
+            simulated.time = Some(time);
+            let jump = simulated.jumps.take(time, Instant::now());
+            simulated.jump = jump.or(simulated.jump.take());
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<Time>> {
-        // A time is replaced as a whole: a panic elsewhere cannot leave half of one behind.
+    /// Returns how the simulated time has jumped since this was asked last, if it has.
+    pub(super) fn take_jump(&self) -> Option<String> {
+        self.lock().as_mut().and_then(|s| s.jump.take())
+    }
+
+    /// Returns whether simulated time is wanted, and none has come.
+    pub(super) fn is_missing(&self) -> bool {
+        self.lock().as_ref().is_some_and(|s| s.time.is_none())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Simulated>> {
+        // Nothing in here can panic between two fields.
         self.simulated
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -141,9 +166,14 @@ mod tests {
 
         assert!(clock.simulate(true));
         assert_eq!(clock.now(), Time::default());
+        assert!(clock.is_missing());
         clock.set(time);
         assert!(!clock.simulate(true));
         assert_eq!(clock.now(), time, "wanted twice is wanted once");
+        assert_eq!(clock.take_jump(), None);
+        clock.set(Time { sec: 6, nanosec: 8 });
+        assert_eq!(clock.take_jump().as_deref(), Some("back by 1.000 s"));
+        assert_eq!(clock.take_jump(), None, "it is told once");
 
         assert!(clock.simulate(false));
         assert!(clock.now().sec > 1_000_000_000);

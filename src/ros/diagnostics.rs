@@ -1,11 +1,13 @@
 //! The node's health once a second, for `rqt_robot_monitor` and the like (REP-107).
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Duration;
 
 use crate::pipeline::{OutcomeCode, TrackCode};
 use crate::tracking::TrackOutcome;
 
+use super::health::{Fault, Faults, WINDOW_S};
 use super::messages::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
 
 /// What is known of the camera.
@@ -62,6 +64,8 @@ pub struct Tally {
     pub undecodable: u64,
     /// Messages not sent because a subscriber did not keep up, or for an error.
     pub dropped: u64,
+    /// Topics on which there were such since the last report, and why.
+    dropping: BTreeMap<String, String>,
 }
 
 impl Tally {
@@ -73,6 +77,17 @@ impl Tally {
     /// Counts what a frame did to the track.
     pub const fn count_track(&mut self, track: TrackCode) {
         self.tracks[track as usize] += 1;
+    }
+
+    /// Counts a message that was not sent on this topic.
+    pub fn drop_one(&mut self, topic: &str, reason: String) {
+        self.dropped += 1;
+        self.dropping.insert(topic.to_owned(), reason);
+    }
+
+    /// Returns the topics on which messages were not sent since this was asked last, and why.
+    pub fn take_dropping(&mut self) -> Vec<(String, String)> {
+        std::mem::take(&mut self.dropping).into_iter().collect()
     }
 
     /// Returns how many frames had this outcome.
@@ -89,12 +104,14 @@ impl Tally {
 }
 
 /// What the report needs beside the counts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Situation<'a> {
     /// The node's time.
     pub now: Time,
     /// The node's name without its namespace.
     pub node: &'a str,
+    /// Whether detections are answered.
+    pub active: bool,
     /// Topic of the detections.
     pub input: &'a str,
     /// Name of the marker map.
@@ -109,6 +126,12 @@ pub struct Situation<'a> {
     pub publishers: usize,
     /// Longest time from a message to its outcome since the last report.
     pub slowest: Duration,
+    /// Median and 99th percentile from a message to the last thing published for it, s.
+    pub latency_s: Option<(f64, f64)>,
+    /// The same from the stamp of an image to its pose, by the node's time, s.
+    pub age_s: Option<(f64, f64)>,
+    /// What is wrong around the node.
+    pub faults: &'a Faults,
 }
 
 /// Turns counts into reports; remembers those of the last report for the rates.
@@ -118,12 +141,6 @@ pub struct Reporter {
 }
 
 impl Reporter {
-    /// Returns how many frames there were up to the last report.
-    #[must_use]
-    pub fn frames(&self) -> u64 {
-        self.previous.frames()
-    }
-
     /// Returns the report of the time since the last one.
     pub fn report(
         &mut self,
@@ -137,15 +154,21 @@ impl Reporter {
             .saturating_sub(self.previous.of(OutcomeCode::Ok));
         let dropped = tally.dropped.saturating_sub(self.previous.dropped);
         let (level, message) = judge(frames, estimates, dropped, situation);
+        let camera_infos = tally
+            .camera_infos
+            .saturating_sub(self.previous.camera_infos);
+        let rate = |count: u64| format!("{:.1}", count as f64 / elapsed.as_secs_f64().max(1e-3));
+        let rates = [
+            ("frame_rate_hz", rate(frames)),
+            ("estimate_rate_hz", rate(estimates)),
+            ("camera_info_rate_hz", rate(camera_infos)),
+        ];
         let status = DiagnosticStatus {
             level,
             name: format!("{}: estimation", situation.node),
             message,
-            hardware_id: match situation.camera {
-                CameraState::Valid { frame_id, .. } => frame_id.clone(),
-                CameraState::Missing | CameraState::Invalid { .. } => String::new(),
-            },
-            values: values(tally, frames, estimates, elapsed, situation),
+            hardware_id: hardware_id(situation.camera),
+            values: values(tally, rates, situation),
         };
         self.previous = tally.clone();
         DiagnosticArray {
@@ -153,7 +176,7 @@ impl Reporter {
                 stamp: situation.now,
                 ..Header::default()
             },
-            status: vec![status],
+            status: vec![status, faults(situation)],
         }
     }
 }
@@ -163,7 +186,10 @@ fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u
     let refused = frames.saturating_sub(estimates);
     let input = situation.input;
     let why = situation.last_refusal.unwrap_or("see status");
-    if frames == 0 {
+    if !situation.active {
+        let message = "inactive: detections are not answered".to_owned();
+        (DiagnosticStatus::OK, message)
+    } else if frames == 0 {
         let message = match situation.publishers {
             0 => format!("no {input}: no publisher"),
             n => format!("no {input}, though {n} publisher(s) exist: check type, QoS and network"),
@@ -182,21 +208,59 @@ fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u
     } else if dropped > 0 {
         (
             DiagnosticStatus::WARN,
-            format!("{dropped} messages dropped: a subscriber does not keep up"),
+            format!("{dropped} messages dropped: see the faults"),
         )
     } else {
         (DiagnosticStatus::OK, format!("{estimates} estimates"))
     }
 }
 
-fn values(
-    tally: &Tally,
-    frames: u64,
-    estimates: u64,
-    elapsed: Duration,
-    situation: &Situation,
-) -> Vec<KeyValue> {
-    let rate = |count: u64| format!("{:.1}", count as f64 / elapsed.as_secs_f64().max(1e-3));
+/// Returns the camera's frame, by which people know it; aggregators want something in any case.
+fn hardware_id(camera: &CameraState) -> String {
+    match camera {
+        CameraState::Valid { frame_id, .. } if !frame_id.is_empty() => frame_id.clone(),
+        _ => "none".to_owned(),
+    }
+}
+
+/// Returns what is wrong around the node, with a key for all that could be.
+fn faults(situation: &Situation) -> DiagnosticStatus {
+    let words = |wanted: Fault| {
+        let of_kind = situation
+            .faults
+            .iter()
+            .filter(|(fault, _)| *fault == wanted)
+            .map(|(_, words)| words);
+        of_kind.collect::<Vec<_>>().join("; ")
+    };
+    let names: Vec<&str> = situation.faults.iter().map(|(f, _)| f.name()).collect();
+    let (level, message) = match situation.faults.iter().next() {
+        None => (DiagnosticStatus::OK, "no faults".to_owned()),
+        Some((fault, words)) if names.len() == 1 => {
+            (DiagnosticStatus::WARN, format!("{}: {words}", fault.name()))
+        }
+        Some(_) => (
+            DiagnosticStatus::WARN,
+            format!("{} faults: {}", names.len(), names.join(", ")),
+        ),
+    };
+    DiagnosticStatus {
+        level,
+        name: format!("{}: faults", situation.node),
+        message,
+        hardware_id: hardware_id(situation.camera),
+        values: Fault::ALL
+            .iter()
+            .map(|fault| KeyValue {
+                key: fault.name().to_owned(),
+                value: words(*fault),
+            })
+            .collect(),
+    }
+}
+
+fn values(tally: &Tally, rates: [(&str, String); 3], situation: &Situation) -> Vec<KeyValue> {
+    let ms = |seconds: Option<f64>| seconds.map_or_else(String::new, |s| format!("{:.3}", s * 1e3));
     let refused = tally.frames() - tally.of(OutcomeCode::Ok);
     let mut pairs = vec![
         ("frames".to_owned(), tally.frames().to_string()),
@@ -205,8 +269,6 @@ fn values(
             tally.of(OutcomeCode::Ok).to_string(),
         ),
         ("refusals".to_owned(), refused.to_string()),
-        ("frame_rate_hz".to_owned(), rate(frames)),
-        ("estimate_rate_hz".to_owned(), rate(estimates)),
         (
             "slowest_solve_ms".to_owned(),
             format!("{:.3}", situation.slowest.as_secs_f64() * 1e3),
@@ -223,6 +285,17 @@ fn values(
         ("undecodable".to_owned(), tally.undecodable.to_string()),
         ("dropped".to_owned(), tally.dropped.to_string()),
     ];
+    let (latency, age) = (situation.latency_s, situation.age_s);
+    let measured = [
+        ("latency_p50_ms", ms(latency.map(|(p50, _)| p50))),
+        ("latency_p99_ms", ms(latency.map(|(_, p99)| p99))),
+        ("image_age_p50_ms", ms(age.map(|(p50, _)| p50))),
+        ("image_age_p99_ms", ms(age.map(|(_, p99)| p99))),
+        ("window_s", WINDOW_S.to_string()),
+    ];
+    let owned = |(key, value): (&str, String)| (key.to_owned(), value);
+    pairs.extend(rates.into_iter().map(owned));
+    pairs.extend(measured.into_iter().map(owned));
     // All of them, also those at zero: who plots a value needs its key from the beginning.
     pairs.extend(
         OutcomeCode::ALL
@@ -255,10 +328,11 @@ mod tests {
 
     const SECOND: Duration = Duration::from_secs(1);
 
-    fn situation(camera: &CameraState) -> Situation<'_> {
+    fn situation<'a>(camera: &'a CameraState, faults: &'a Faults) -> Situation<'a> {
         Situation {
             now: Time { sec: 7, nanosec: 8 },
             node: "tanker_pose",
+            active: true,
             input: "feature_points",
             marker_map: "paper",
             camera,
@@ -266,13 +340,16 @@ mod tests {
             track: None,
             publishers: 1,
             slowest: Duration::from_micros(1500),
+            latency_s: Some((0.0004, 0.0025)),
+            age_s: None,
+            faults,
         }
     }
 
     fn report(reporter: &mut Reporter, tally: &Tally) -> DiagnosticStatus {
-        let camera = CameraState::Missing;
+        let (camera, faults) = (CameraState::Missing, Faults::default());
         reporter
-            .report(tally, SECOND, &situation(&camera))
+            .report(tally, SECOND, &situation(&camera, &faults))
             .status
             .remove(0)
     }
@@ -313,6 +390,9 @@ mod tests {
         assert_eq!(value(&status, "refusals.AMBIGUOUS"), "0");
         assert_eq!(value(&status, "frame_rate_hz"), "1.0");
         assert_eq!(value(&status, "slowest_solve_ms"), "1.500");
+        assert_eq!(value(&status, "latency_p50_ms"), "0.400");
+        assert_eq!(value(&status, "latency_p99_ms"), "2.500");
+        assert_eq!(value(&status, "image_age_p50_ms"), "");
     }
 
     #[test]
@@ -321,6 +401,23 @@ mod tests {
         tally.count(OutcomeCode::Ok);
         tally.dropped = 3;
         assert_eq!(report(&mut reporter, &tally).level, DiagnosticStatus::WARN);
+    }
+
+    #[test]
+    fn faults_are_shown_by_their_keys_and_none_is_ok() {
+        let (camera, mut faults) = (CameraState::Missing, Faults::default());
+        let status = super::faults(&situation(&camera, &faults));
+        assert_eq!(status.level, DiagnosticStatus::OK);
+        assert!(status.values.iter().all(|pair| pair.value.is_empty()));
+        assert_eq!(status.values.len(), Fault::ALL.len());
+
+        let now = std::time::Instant::now();
+        faults.see_of(Fault::DroppedOutput, "/pose", "pose", now);
+        faults.see_of(Fault::DroppedOutput, "/status", "status", now);
+        let status = super::faults(&situation(&camera, &faults));
+        assert_eq!(status.level, DiagnosticStatus::WARN);
+        assert_eq!(value(&status, "dropped_output"), "pose; status");
+        assert_eq!(value(&status, "stamp_jump"), "");
     }
 
     #[test]

@@ -7,6 +7,8 @@ use ros2_client::{Publisher, WriteError};
 use super::clock::NodeClock;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
+use super::graph::Graph;
+use super::health::{Second, Watch, seconds_between};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
@@ -21,48 +23,27 @@ use crate::pipeline::{
 };
 use crate::tracking::TrackOutcome;
 
-/// Seconds without detections before that is said.
-const SILENCE_S: u32 = 3;
-
 /// A topic that never makes the node wait: what a slow subscriber has no room for is dropped and
 /// counted.
 pub struct Output<M: Message> {
     publisher: Publisher<M>,
     topic: String,
-    said: SaidOnce<()>,
 }
 
 impl<M: Message> Output<M> {
     /// Returns the output to `topic` through `publisher`.
     #[must_use]
-    pub fn new(publisher: Publisher<M>, topic: String) -> Self {
-        Self {
-            publisher,
-            topic,
-            said: SaidOnce::default(),
-        }
+    pub const fn new(publisher: Publisher<M>, topic: String) -> Self {
+        Self { publisher, topic }
     }
 
     fn publish(&mut self, message: M, tally: &mut Tally) {
-        let Err(error) = self.publisher.publish(message) else {
-            if let Some(count) = self.said.good() {
-                log::info!(
-                    "publishing {} again after {count} dropped messages",
-                    self.topic
-                );
-            }
-            return;
-        };
-        tally.dropped += 1;
-        if self.said.fault((), Instant::now()) {
-            if let WriteError::WouldBlock { .. } = error {
-                log::warn!(
-                    "a subscriber of {} does not keep up: messages are dropped",
-                    self.topic
-                );
-            } else {
-                log::error!("cannot publish {}: {error}", self.topic);
-            }
+        if let Err(error) = self.publisher.publish(message) {
+            let reason = match error {
+                WriteError::WouldBlock { .. } => "a subscriber does not keep up".to_owned(),
+                other => other.to_string(),
+            };
+            tally.drop_one(&self.topic, reason);
         }
     }
 }
@@ -100,16 +81,16 @@ pub struct Estimator {
     last_track: Option<TrackOutcome>,
     slowest: Duration,
     last_report: Instant,
+    watch: Watch,
     refusals: SaidOnce<OutcomeCode>,
     bad_camera: SaidOnce<()>,
     bad_samples: SaidOnce<&'static str>,
-    silence: SaidOnce<(bool, bool)>,
-    silent_seconds: u32,
     own_child: SaidOnce<()>,
 }
 
 impl Estimator {
-    /// Returns an estimator that has not seen a message yet and is not active, for the node of this name.
+    /// Returns an estimator that has not seen a message yet and is not active, for the node of this name, and a
+    /// watch over its inputs.
     #[must_use]
     pub fn new(
         pipeline: Pipeline,
@@ -117,8 +98,10 @@ impl Estimator {
         outputs: Outputs,
         clock: NodeClock,
         node: &str,
+        watch: Watch,
     ) -> Self {
         Self {
+            watch,
             pipeline,
             reader,
             outputs,
@@ -135,8 +118,6 @@ impl Estimator {
             refusals: SaidOnce::default(),
             bad_camera: SaidOnce::default(),
             bad_samples: SaidOnce::default(),
-            silence: SaidOnce::default(),
-            silent_seconds: 0,
             own_child: SaidOnce::default(),
         }
     }
@@ -155,6 +136,7 @@ impl Estimator {
     /// Takes a camera info.
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
+        self.watch.on_camera_info(Instant::now());
         let info = convert::camera_info(message);
         let result = self.pipeline.set_camera(&info, &message.header.frame_id);
         let was_valid = matches!(self.camera, CameraState::Valid { .. });
@@ -166,16 +148,24 @@ impl Estimator {
 
     /// Takes the detections of an image; publishes what becomes of them.
     pub fn on_detections(&mut self, message: InputMessage) {
+        let begin = Instant::now();
+        self.watch.on_detections(begin);
         if !self.active {
             self.tally.unanswered += 1;
             return;
         }
-        let begin = Instant::now();
         let sighting = self.reader.read(message);
         let header = sighting.header;
         let (frame, outcome) = self.outcome(&header, sighting.detections);
         let solve_time = begin.elapsed();
 
+        let is_of_camera = self
+            .pipeline
+            .camera_for(frame.stamp, &frame.frame_id)
+            .is_ok();
+        if is_of_camera && outcome.code() != OutcomeCode::FrameMismatch {
+            self.watch.on_image(header.stamp, begin);
+        }
         if let Ok(solution) = &outcome.result {
             self.outputs
                 .pose
@@ -189,6 +179,13 @@ impl Estimator {
         self.outputs.status.publish(status, &mut self.tally);
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
+        let end = Instant::now();
+        let taken = end.saturating_duration_since(begin);
+        self.watch.latency.take(taken.as_secs_f64(), end);
+        if outcome.result.is_ok() {
+            let age_s = seconds_between(header.stamp, self.clock.now());
+            self.watch.age.take(age_s, end);
+        }
     }
 
     /// Returns the detections as a frame, and what becomes of it; without detections their refusal.
@@ -229,16 +226,27 @@ impl Estimator {
     /// Takes note of a sample on `topic` that could not be decoded.
     pub fn on_undecodable(&mut self, topic: &'static str, error: &ros2_client::ReadError) {
         self.tally.undecodable += 1;
+        if topic == self.reader.input.topic() {
+            self.watch.on_detections(Instant::now());
+        }
         if self.bad_samples.fault(topic, Instant::now()) {
             log::warn!("cannot decode a sample of {topic}: {error}");
         }
     }
 
-    /// Publishes the diagnostics; `publishers`: of the input, in the graph.
-    pub fn on_second(&mut self, publishers: usize, now: Instant) {
+    /// Looks for faults and publishes the diagnostics; `publishers`: of the input, whatever they send.
+    pub fn on_second(&mut self, publishers: usize, graph: &Graph, now: Instant) {
+        let second = Second {
+            graph,
+            clock_jump: self.clock.take_jump(),
+            clock_missing: self.clock.is_missing(),
+            dropped: self.tally.take_dropping(),
+        };
+        self.watch.on_second(second, now);
         let situation = Situation {
             now: self.clock.now(),
             node: &self.node,
+            active: self.active,
             input: self.reader.input.topic(),
             marker_map: self.reader.map.name(),
             camera: &self.camera,
@@ -246,12 +254,13 @@ impl Estimator {
             track: self.last_track.as_ref(),
             publishers,
             slowest: self.slowest,
+            latency_s: self.watch.latency.p50_and_p99_s(now),
+            age_s: self.watch.age.p50_and_p99_s(now),
+            faults: &self.watch.faults,
         };
         let elapsed = now.saturating_duration_since(self.last_report);
-        let frames_before = self.reporter.frames();
         let report = self.reporter.report(&self.tally, elapsed, &situation);
         self.outputs.diagnostics.publish(report, &mut self.tally);
-        self.watch_silence(self.tally.frames() > frames_before, publishers, now);
         self.last_refusal = None;
         self.slowest = Duration::ZERO;
         self.last_report = now;
@@ -354,37 +363,15 @@ impl Estimator {
             return;
         }
         self.last_refusal = Some(message.to_owned());
-        if self.refusals.fault(outcome, Instant::now()) {
-            let (sec, nanosec) = (stamp.sec, stamp.nanosec);
-            log::warn!(
-                "refused from {sec}.{nanosec:09} on, {}: {message}",
-                outcome.name()
-            );
-        }
-    }
-
-    /// Says when detections do not come, after a while, and when they do.
-    fn watch_silence(&mut self, arrived: bool, publishers: usize, now: Instant) {
-        let topic = self.reader.input.topic();
-        if arrived {
-            self.silent_seconds = 0;
-            if self.silence.good().is_some() {
-                log::info!("{topic} arrive");
-            }
-            return;
-        }
-        self.silent_seconds = self.silent_seconds.saturating_add(1);
-        let ever = self.tally.frames() > 0;
-        if self.silent_seconds < SILENCE_S || !self.silence.fault((ever, publishers > 0), now) {
-            return;
-        }
-        match (ever, publishers) {
-            (false, 0) => log::info!("waiting for {topic}: nobody publishes them yet"),
-            (false, n) => log::warn!(
-                "{topic} have {n} publisher(s), but nothing has arrived: check type, QoS and network"
-            ),
-            (true, 0) => log::warn!("{topic} have stopped: their publisher is gone"),
-            (true, n) => log::warn!("{topic} have stopped, though {n} publisher(s) exist"),
+        let now = Instant::now();
+        let (sec, nanosec) = (stamp.sec, stamp.nanosec);
+        let words = format!(
+            "refused from {sec}.{nanosec:09} on, {}: {message}",
+            outcome.name()
+        );
+        let is_new = self.refusals.fault(outcome, now);
+        if !self.watch.on_refusal(outcome, &words, now) && is_new {
+            log::warn!("{words}");
         }
     }
 }

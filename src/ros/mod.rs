@@ -9,6 +9,7 @@
 //! lifecycle                          a managed node's states, behind their services
 //! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
+//! graph, health                      the other ends of the topics; faults around the node, said and shown
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
 //! node, serve                        all of it together, until a signal or a tool ends it
@@ -22,6 +23,8 @@ pub mod convert;
 pub mod diagnostics;
 pub mod environment;
 pub mod estimator;
+pub mod graph;
+pub mod health;
 pub mod input;
 pub mod leave;
 pub mod lifecycle;

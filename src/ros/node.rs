@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 use async_signal::{Signal, Signals};
 use futures::StreamExt;
@@ -11,6 +12,7 @@ use super::arguments::Arguments;
 use super::clock::NodeClock;
 use super::environment::Environment;
 use super::estimator::{Estimator, Output, Outputs};
+use super::health::Watch;
 pub use super::input::{DETECTIONS, FEATURE_POINTS};
 use super::input::{InputReader, InputSubscription};
 use super::logging;
@@ -280,15 +282,28 @@ pub(super) fn estimator(
     map: &Arc<MarkerMap>,
     outputs: Outputs,
     clock: &NodeClock,
-) -> Estimator {
+) -> Result<Estimator, NamesError> {
     let reader = InputReader {
         input: configuration.input,
         map: Arc::clone(map),
         max_hamming: configuration.max_hamming,
     };
     let pipeline = Pipeline::new(configuration.settings.clone(), Arc::clone(map));
-    let name = ros.names().base_name();
-    Estimator::new(pipeline, reader, outputs, clock.clone(), name)
+    let names = ros.names();
+    let watch = Watch::new(
+        names.topic(configuration.input.topic())?,
+        names.topic(CAMERA_INFO)?,
+        Instant::now(),
+    );
+    let name = names.base_name();
+    Ok(Estimator::new(
+        pipeline,
+        reader,
+        outputs,
+        clock.clone(),
+        name,
+        watch,
+    ))
 }
 
 fn output<M: Message>(

@@ -26,6 +26,7 @@ pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
 
 use super::arguments::Arguments;
 use super::environment::Environment;
+use super::graph::{Graph, OwnEnd};
 use super::leave::Farewell;
 use super::messages::Message;
 use super::names::{NamesError, NodeNames};
@@ -124,6 +125,7 @@ pub struct RosNode {
     context: Context,
     names: NodeNames,
     qos_overrides: QosOverrides,
+    own_ends: Vec<OwnEnd>,
     farewell: Farewell,
 }
 
@@ -160,6 +162,7 @@ impl RosNode {
             context,
             names,
             qos_overrides: QosOverrides::default(),
+            own_ends: Vec::new(),
             farewell,
         })
     }
@@ -179,7 +182,7 @@ impl RosNode {
         qos: &QosProfile,
     ) -> Result<Publisher<M>, EndpointError> {
         let name = self.names.client_topic(topic)?;
-        let qos = self.qos(topic, Role::Publisher, qos)?;
+        let qos = self.qos::<M>(topic, Role::Publisher, qos)?;
         self.node
             .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| self.node.create_publisher(&topic, None))
@@ -199,7 +202,7 @@ impl RosNode {
         qos: &QosProfile,
     ) -> Result<Subscription<M>, EndpointError> {
         let name = self.names.client_topic(topic)?;
-        let qos = self.qos(topic, Role::Subscription, qos)?;
+        let qos = self.qos::<M>(topic, Role::Subscription, qos)?;
         self.node
             .create_topic(&name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| self.node.create_subscription(&topic, None))
@@ -209,9 +212,28 @@ impl RosNode {
             })
     }
 
-    fn qos(&self, topic: &str, role: Role, default: &QosProfile) -> Result<QosProfile, NamesError> {
+    /// Returns the quality of service that the end of a topic opens with, and takes note of that end.
+    fn qos<M: Message>(
+        &mut self,
+        topic: &str,
+        role: Role,
+        default: &QosProfile,
+    ) -> Result<QosProfile, NamesError> {
         let topic = self.names.topic(topic)?;
-        Ok(self.qos_overrides.profile(&topic, role, default))
+        let qos = self.qos_overrides.profile(&topic, role, default);
+        self.own_ends.push(OwnEnd {
+            topic,
+            role,
+            type_name: format!("{}::msg::dds_::{}_", M::PACKAGE, M::NAME),
+            qos: (&qos).into(),
+        });
+        Ok(qos)
+    }
+
+    /// Returns how the other ends of the topics opened so far fit.
+    #[must_use]
+    pub fn graph(&self) -> Graph {
+        Graph::of(&self.context.domain_participant(), &self.own_ends)
     }
 
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.

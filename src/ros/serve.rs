@@ -133,7 +133,8 @@ impl<'a> Server<'a> {
                 }),
                 _ = seconds.select_next_some() => {
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
-                    self.with(|estimator| estimator.on_second(publishers, Instant::now()));
+                    let graph = self.ros.graph();
+                    self.with(|estimator| estimator.on_second(publishers, &graph, Instant::now()));
                 },
                 sample = detections.select_next_some() => self.with(|estimator| match sample {
                     Ok(message) => estimator.on_detections(message),
@@ -219,7 +220,7 @@ impl<'a> Server<'a> {
         let map = Arc::new(map);
         introduce(self.ros, self.environment, &map, configuration);
         warn_of_too_small_map(configuration, &map);
-        let estimator = estimator(self.ros, configuration, &map, outputs, &self.clock);
+        let estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
         self.work = Work::Ready(Box::new(estimator));
         Ok(())
     }

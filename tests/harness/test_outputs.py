@@ -123,6 +123,8 @@ def test_a_repeated_fault_is_logged_once_not_every_frame(estimator: Estimator) -
         spoilt.points[0].id = 4711
         estimator.ask(spoilt)
 
-    lines = estimator.process.log.splitlines()[before:]
+    # Faults before it may be over by now, which is no warning.
+    added = estimator.process.log.splitlines()[before:]
+    lines = [line for line in added if "[INFO]" not in line]
     assert len(lines) == 1, "\n".join(lines)
     assert "4711" in lines[0]

@@ -1,0 +1,240 @@
+//! The other ends of the node's topics: who is there, and why nothing passes to or from whom.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ros2_client::dds::rustdds::policy::{Deadline, Durability, Reliability};
+use ros2_client::dds::rustdds::qos::QosPolicyId;
+use ros2_client::dds::rustdds::{DomainParticipant, QosPolicies};
+
+use super::qos_overrides::Role;
+use crate::text::clip;
+
+/// One of the node's own ends of topics.
+#[derive(Debug, Clone)]
+pub struct OwnEnd {
+    /// Absolute name of the topic.
+    pub topic: String,
+    /// Which end.
+    pub role: Role,
+    /// Type on the wire.
+    pub type_name: String,
+    /// Quality of service.
+    pub qos: QosPolicies,
+}
+
+/// Why nothing passes between an end of ours and one of another node; the words are for people.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Misfit {
+    /// They do not mean the same kind of message.
+    Type(String),
+    /// One asks for more than the other gives.
+    Qos(String),
+}
+
+/// What the graph holds beside the node.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Graph {
+    /// Ends of others from or to which nothing passes; equal ones once.
+    pub misfits: BTreeSet<Misfit>,
+    /// Publishers that are heard, by the absolute name of the topic.
+    pub heard: BTreeMap<String, usize>,
+}
+
+/// Somebody else's end of a topic.
+struct OtherEnd {
+    topic: String,
+    type_name: String,
+    qos: QosPolicies,
+}
+
+impl Graph {
+    /// Returns how the ends that the participant has discovered fit these.
+    #[must_use]
+    pub fn of(participant: &DomainParticipant, own_ends: &[OwnEnd]) -> Self {
+        let writers = participant.discovered_writers().into_iter().map(|writer| {
+            let data = writer.publication_topic_data;
+            (
+                Role::Publisher,
+                OtherEnd {
+                    qos: data.qos(),
+                    topic: data.topic_name,
+                    type_name: data.type_name,
+                },
+            )
+        });
+        let readers = participant.discovered_readers().into_iter().map(|reader| {
+            let data = reader.subscription_topic_data;
+            (
+                Role::Subscription,
+                OtherEnd {
+                    qos: data.qos(),
+                    topic: data.topic_name().clone(),
+                    type_name: data.type_name().clone(),
+                },
+            )
+        });
+        let mut graph = Self::default();
+        for (role, other) in writers.chain(readers) {
+            for own in own_ends {
+                if own.role != role && other.topic.strip_prefix("rt") == Some(&own.topic) {
+                    graph.add(own, &other);
+                }
+            }
+        }
+        graph
+    }
+
+    fn add(&mut self, own: &OwnEnd, other: &OtherEnd) {
+        if let Some(misfit) = misfit(own, other) {
+            self.misfits.insert(misfit);
+        } else if own.role == Role::Subscription {
+            *self.heard.entry(own.topic.clone()).or_default() += 1;
+        }
+    }
+
+    /// Returns how many publishers of the topic with this absolute name are heard.
+    #[must_use]
+    pub fn heard(&self, topic: &str) -> usize {
+        self.heard.get(topic).copied().unwrap_or(0)
+    }
+}
+
+fn misfit(own: &OwnEnd, other: &OtherEnd) -> Option<Misfit> {
+    let topic = &own.topic;
+    let listens = own.role == Role::Subscription;
+    if own.type_name != other.type_name {
+        let (expected, got) = (ros_type(&own.type_name), ros_type(&other.type_name));
+        let got = clip(&got).escape_debug().to_string();
+        return Some(Misfit::Type(if listens {
+            format!("a publisher of {topic} sends {got}, expected {expected}: it is not heard")
+        } else {
+            format!("a subscriber of {topic} expects {got}, sent is {expected}: it hears nothing")
+        }));
+    }
+    let (offered, requested) = if listens {
+        (&other.qos, &own.qos)
+    } else {
+        (&own.qos, &other.qos)
+    };
+    let policy = offered.compliance_failure_wrt(requested)?;
+    let (offered, requested) = (offer(offered, policy), request(requested, policy));
+    let name = format!("{policy:?}").to_lowercase();
+    Some(Misfit::Qos(if listens {
+        format!(
+            "a publisher of {topic} offers {name} {offered}, requested is {requested}: it is not heard \
+             (see qos_overrides)"
+        )
+    } else {
+        format!(
+            "a subscriber of {topic} requests {name} {requested}, offered is {offered}: it hears nothing \
+             (see qos_overrides)"
+        )
+    }))
+}
+
+/// What is not said is the default, which is not the same for both sides.
+fn offer(qos: &QosPolicies, policy: QosPolicyId) -> String {
+    shown(qos, policy, "reliable")
+}
+
+fn request(qos: &QosPolicies, policy: QosPolicyId) -> String {
+    shown(qos, policy, "best_effort")
+}
+
+fn shown(qos: &QosPolicies, policy: QosPolicyId, default_reliability: &str) -> String {
+    match policy {
+        QosPolicyId::Reliability => match qos.reliability() {
+            Some(Reliability::BestEffort) => "best_effort",
+            Some(Reliability::Reliable { .. }) => "reliable",
+            None => default_reliability,
+        }
+        .to_owned(),
+        QosPolicyId::Durability => match qos.durability() {
+            Some(Durability::Volatile) | None => "volatile",
+            Some(Durability::TransientLocal) => "transient_local",
+            Some(Durability::Transient) => "transient",
+            Some(Durability::Persistent) => "persistent",
+        }
+        .to_owned(),
+        QosPolicyId::Deadline => match qos.deadline() {
+            Some(Deadline(duration)) => format!("{:.3} s", duration.to_std().as_secs_f64()),
+            None => "none".to_owned(),
+        },
+        _ => "another".to_owned(),
+    }
+}
+
+/// Returns `package/msg/Name` of the name on the wire, `package::msg::dds_::Name_`.
+fn ros_type(on_the_wire: &str) -> String {
+    let name = on_the_wire.replace("::dds_::", "::").replace("::", "/");
+    name.strip_suffix('_').unwrap_or(&name).to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::participant::{QosProfile, reliable, sensor_data};
+
+    const TYPE: &str = "sensor_msgs::msg::dds_::CameraInfo_";
+
+    fn own(role: Role, qos: &QosProfile) -> OwnEnd {
+        OwnEnd {
+            topic: "/camera_info".into(),
+            role,
+            type_name: TYPE.into(),
+            qos: qos.into(),
+        }
+    }
+
+    fn other(type_name: &str, qos: &QosProfile) -> OtherEnd {
+        OtherEnd {
+            topic: "rt/camera_info".into(),
+            type_name: type_name.into(),
+            qos: qos.into(),
+        }
+    }
+
+    fn words(own: &OwnEnd, other: &OtherEnd) -> String {
+        match misfit(own, other) {
+            Some(Misfit::Type(words) | Misfit::Qos(words)) => words,
+            None => String::new(),
+        }
+    }
+
+    #[test]
+    fn either_side_that_asks_for_more_than_the_other_gives_is_named_with_both() {
+        let (more, less) = (reliable(1), sensor_data(1));
+        let listens = own(Role::Subscription, &more);
+        let said = words(&listens, &other(TYPE, &less));
+        assert!(
+            said.contains("offers reliability best_effort, requested is reliable"),
+            "{said}"
+        );
+        let speaks = own(Role::Publisher, &less);
+        let said = words(&speaks, &other(TYPE, &more));
+        assert!(
+            said.contains("requests reliability reliable, offered is best_effort"),
+            "{said}"
+        );
+        assert_eq!(words(&own(Role::Publisher, &more), &other(TYPE, &less)), "");
+        assert_eq!(
+            words(&own(Role::Subscription, &less), &other(TYPE, &more)),
+            ""
+        );
+    }
+
+    #[test]
+    fn another_type_is_named_as_ros_writes_it_without_control_characters() {
+        let listens = own(Role::Subscription, &sensor_data(1));
+        let said = words(
+            &listens,
+            &other("std_msgs::msg::dds_::String_", &reliable(1)),
+        );
+        assert!(
+            said.contains("sends std_msgs/msg/String, expected sensor_msgs/msg/CameraInfo"),
+            "{said}"
+        );
+        let said = words(&listens, &other("a\u{1b}[31m", &reliable(1)));
+        assert!(!said.contains('\u{1b}'), "{said}");
+    }
+}

@@ -1,0 +1,209 @@
+//! Faults that last: each is said once when it begins and once when it ends.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// What can be wrong around the node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fault {
+    /// A publisher or subscriber asks for another quality of service than there is.
+    IncompatibleQos,
+    /// A publisher or subscriber means another message type.
+    WrongType,
+    /// A publisher is there, and nothing comes.
+    SilentPublisher,
+    /// The camera is there, or detections were, and none come.
+    NoDetections,
+    /// Detections come, and no camera info ever has.
+    NoCameraInfo,
+    /// Detections come, and the camera info that came steadily no longer does.
+    StaleCameraInfo,
+    /// Detections and camera info name different frames.
+    FrameMismatch,
+    /// Stamps of detections go back, or far ahead.
+    StampJump,
+    /// The simulated time goes back, or far ahead.
+    ClockJump,
+    /// Simulated time is wanted, and none comes.
+    NoClock,
+    /// Something could not be published.
+    DroppedOutput,
+}
+
+/// How long a single event counts as lasting.
+const EVENT: Duration = Duration::from_secs(3);
+/// How long a fault that frames show lasts without frames.
+const SHOWN_BY_FRAMES: Duration = Duration::from_secs(10);
+/// How long it lasts once a frame shows that it is over: two detectors may take turns.
+const OVER: Duration = Duration::from_secs(1);
+
+impl Fault {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::IncompatibleQos,
+        Self::WrongType,
+        Self::SilentPublisher,
+        Self::NoDetections,
+        Self::NoCameraInfo,
+        Self::StaleCameraInfo,
+        Self::FrameMismatch,
+        Self::StampJump,
+        Self::ClockJump,
+        Self::NoClock,
+        Self::DroppedOutput,
+    ];
+
+    /// Returns its key in `/diagnostics` and in the log.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::IncompatibleQos => "incompatible_qos",
+            Self::WrongType => "wrong_type",
+            Self::SilentPublisher => "silent_publisher",
+            Self::NoDetections => "no_detections",
+            Self::NoCameraInfo => "no_camera_info",
+            Self::StaleCameraInfo => "stale_camera_info",
+            Self::FrameMismatch => "frame_mismatch",
+            Self::StampJump => "stamp_jump",
+            Self::ClockJump => "clock_jump",
+            Self::NoClock => "no_clock",
+            Self::DroppedOutput => "dropped_output",
+        }
+    }
+
+    /// Returns how long it lasts after it was last seen.
+    const fn lasts(self) -> Duration {
+        match self {
+            Self::StampJump | Self::ClockJump | Self::DroppedOutput => EVENT,
+            Self::NoCameraInfo | Self::FrameMismatch => SHOWN_BY_FRAMES,
+            // Looked for every second.
+            _ => Duration::ZERO,
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Open {
+    said: String,
+    latest: String,
+    since: Instant,
+    seen: Instant,
+    over: bool,
+}
+
+/// The faults that last now.
+#[derive(Debug, Default)]
+pub struct Faults {
+    open: BTreeMap<(Fault, String), Open>,
+}
+
+impl Faults {
+    /// Takes note of a fault of which there is one at a time, in these words.
+    pub fn see(&mut self, fault: Fault, words: &str, now: Instant) {
+        self.see_of(fault, "", words, now);
+    }
+
+    /// Takes note of a fault of something of which there are many.
+    pub fn see_of(&mut self, fault: Fault, of: &str, words: &str, now: Instant) {
+        let key = (fault, of.to_owned());
+        if let Some(open) = self.open.get_mut(&key) {
+            open.seen = now;
+            open.over = false;
+            words.clone_into(&mut open.latest);
+            return;
+        }
+        log::warn!("{}: {words}", fault.name());
+        let open = Open {
+            said: words.to_owned(),
+            latest: words.to_owned(),
+            since: now,
+            seen: now,
+            over: false,
+        };
+        self.open.insert(key, open);
+    }
+
+    /// Takes note that a fault seems to be over.
+    pub fn end(&mut self, fault: Fault) {
+        for ((_, _), open) in self.open.iter_mut().filter(|((kind, _), _)| *kind == fault) {
+            open.over = true;
+        }
+    }
+
+    /// Ends those that have not been seen for as long as they last.
+    pub fn end_unseen(&mut self, now: Instant) {
+        self.open.retain(|(fault, _), open| {
+            let lasts = if open.over { OVER } else { fault.lasts() };
+            let stays = now.saturating_duration_since(open.seen) <= lasts;
+            if !stays {
+                let seconds = now.saturating_duration_since(open.since).as_secs_f64();
+                let (name, said) = (fault.name(), &open.said);
+                log::info!("{name} is over after {seconds:.1} s: {said}");
+            }
+            stays
+        });
+    }
+
+    /// Returns the words of all that last now, in the order of [`Fault::ALL`].
+    pub fn iter(&self) -> impl Iterator<Item = (Fault, &str)> {
+        self.open
+            .iter()
+            .map(|((fault, _), open)| (*fault, open.latest.as_str()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    fn open(faults: &Faults) -> Vec<(Fault, &str)> {
+        faults.iter().collect()
+    }
+
+    #[test]
+    fn fault_lasts_while_it_is_seen_and_shows_its_latest_words() {
+        let (mut faults, start) = (Faults::default(), Instant::now());
+        faults.see(Fault::NoDetections, "none", start);
+        faults.end_unseen(start);
+        assert_eq!(open(&faults), [(Fault::NoDetections, "none")]);
+        faults.see(Fault::NoDetections, "still none", start + SECOND);
+        faults.end_unseen(start + SECOND);
+        assert_eq!(open(&faults), [(Fault::NoDetections, "still none")]);
+        faults.end_unseen(start + 2 * SECOND);
+        assert_eq!(open(&faults), []);
+    }
+
+    #[test]
+    fn event_is_shown_for_a_while_and_faults_of_many_things_end_apart() {
+        let (mut faults, start) = (Faults::default(), Instant::now());
+        faults.see(Fault::StampJump, "back", start);
+        faults.see_of(Fault::DroppedOutput, "/pose", "full", start);
+        faults.see_of(Fault::DroppedOutput, "/status", "full", start);
+        faults.see_of(Fault::DroppedOutput, "/pose", "full", start + 2 * SECOND);
+        faults.end_unseen(start + 3 * SECOND);
+        assert_eq!(open(&faults).len(), 3);
+        faults.end_unseen(start + 4 * SECOND);
+        assert_eq!(open(&faults), [(Fault::DroppedOutput, "full")]);
+    }
+
+    #[test]
+    fn fault_that_comes_and_goes_with_every_frame_is_one_fault() {
+        let (mut faults, start) = (Faults::default(), Instant::now());
+        let frame = Duration::from_millis(20);
+        for i in 0..1000 {
+            faults.see(Fault::FrameMismatch, &i.to_string(), start + 2 * i * frame);
+            faults.end(Fault::FrameMismatch);
+            faults.end_unseen(start + (2 * i + 1) * frame);
+            let words = i.to_string();
+            assert_eq!(open(&faults), [(Fault::FrameMismatch, words.as_str())]);
+        }
+        assert_eq!(
+            faults.open.values().next().map(|open| open.since),
+            Some(start)
+        );
+        faults.end_unseen(start + 2000 * frame + SECOND);
+        assert_eq!(open(&faults), []);
+    }
+}

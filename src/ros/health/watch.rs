@@ -1,0 +1,341 @@
+//! Notices what is wrong around the node, from what arrives, what is refused and what the graph holds.
+
+use std::time::{Duration, Instant};
+
+use super::{Fault, Faults, Jumps, Latency};
+use crate::pipeline::OutcomeCode;
+use crate::ros::graph::{Graph, Misfit};
+use crate::ros::messages::Time;
+
+/// Longer than a reliable publisher on Fast DDS may take for its first sample: 3 s, its heartbeat's period.
+const SILENCE: Duration = Duration::from_secs(5);
+/// A camera info counts as steady after so many seconds with one in each; one that is latched never is.
+const STEADY_S: u32 = 3;
+/// Without detections and publishers of them for so long, that is said.
+const WAIT: Duration = Duration::from_secs(3);
+/// Most ends of others that are named; a strange graph may have any number.
+const MOST_MISFITS: usize = 16;
+
+/// What arrives on a topic.
+#[derive(Debug, Default)]
+struct Arrivals {
+    last: Option<Instant>,
+    this_second: bool,
+    steady_s: u32,
+    was_steady: bool,
+    /// Since when there is somebody to hear.
+    heard_since: Option<Instant>,
+}
+
+impl Arrivals {
+    fn take(&mut self, now: Instant) {
+        self.last = Some(now);
+        self.this_second = true;
+    }
+
+    fn on_second(&mut self, publishers: usize, now: Instant) {
+        self.steady_s = if self.this_second {
+            self.steady_s.saturating_add(1)
+        } else {
+            0
+        };
+        self.was_steady |= self.steady_s >= STEADY_S;
+        self.this_second = false;
+        self.heard_since = if publishers == 0 {
+            None
+        } else {
+            self.heard_since.or(Some(now))
+        };
+    }
+
+    fn ever(&self) -> bool {
+        self.last.is_some()
+    }
+
+    /// Whether the last one came a short while ago.
+    fn recent(&self, now: Instant) -> bool {
+        self.last.is_some_and(|last| !is_long(last, now))
+    }
+
+    /// Whether there is somebody to hear, for a while, and nothing comes.
+    fn silent(&self, now: Instant) -> bool {
+        self.heard_since.is_some_and(|since| is_long(since, now)) && !self.recent(now)
+    }
+}
+
+fn is_long(since: Instant, now: Instant) -> bool {
+    now.saturating_duration_since(since) >= SILENCE
+}
+
+/// What a second brings beside the messages.
+pub struct Second<'a> {
+    /// The other ends of the node's topics.
+    pub graph: &'a Graph,
+    /// How `/clock` jumped, if it did.
+    pub clock_jump: Option<String>,
+    /// Whether simulated time is wanted and none has come.
+    pub clock_missing: bool,
+    /// Topics on which something was dropped, and why.
+    pub dropped: Vec<(String, String)>,
+}
+
+/// Notices faults.
+#[derive(Debug)]
+pub struct Watch {
+    /// Those that last.
+    pub faults: Faults,
+    /// From a message to the last thing published for it.
+    pub latency: Latency,
+    /// From the stamp of an image to the pose, in the node's time.
+    pub age: Latency,
+    detections_topic: String,
+    camera_topic: String,
+    begin: Instant,
+    detections: Arrivals,
+    camera: Arrivals,
+    stamps: Jumps,
+    clock_missing_since: Option<Instant>,
+    waiting_said: bool,
+}
+
+impl Watch {
+    /// Returns a watch over the inputs with these absolute names.
+    #[must_use]
+    pub fn new(detections_topic: String, camera_topic: String, now: Instant) -> Self {
+        Self {
+            faults: Faults::default(),
+            latency: Latency::default(),
+            age: Latency::default(),
+            detections_topic,
+            camera_topic,
+            begin: now,
+            detections: Arrivals::default(),
+            camera: Arrivals::default(),
+            stamps: Jumps::default(),
+            clock_missing_since: None,
+            waiting_said: false,
+        }
+    }
+
+    /// Takes note that detections came, of whatever kind.
+    pub fn on_detections(&mut self, now: Instant) {
+        self.detections.take(now);
+    }
+
+    /// Takes note that a camera info came.
+    pub fn on_camera_info(&mut self, now: Instant) {
+        self.camera.take(now);
+        self.faults.end(Fault::NoCameraInfo);
+    }
+
+    /// Takes note of an image from the camera's frame.
+    pub fn on_image(&mut self, stamp: Time, now: Instant) {
+        self.faults.end(Fault::FrameMismatch);
+        if let Some(jump) = self.stamps.take(stamp, now) {
+            let topic = &self.detections_topic;
+            let words = format!("stamps of {topic} went {jump}");
+            self.faults.see(Fault::StampJump, &words, now);
+        }
+    }
+
+    /// Takes note of a refusal; returns whether it is a fault of the surroundings, and so is said here.
+    pub fn on_refusal(&mut self, outcome: OutcomeCode, words: &str, now: Instant) -> bool {
+        let fault = match outcome {
+            OutcomeCode::NoCameraInfo => Fault::NoCameraInfo,
+            OutcomeCode::FrameMismatch => Fault::FrameMismatch,
+            _ => return false,
+        };
+        self.faults.see(fault, words, now);
+        true
+    }
+
+    /// Looks for faults once a second.
+    pub fn on_second(&mut self, second: Second, now: Instant) {
+        let detectors = second.graph.heard(&self.detections_topic);
+        let cameras = second.graph.heard(&self.camera_topic);
+        self.detections.on_second(detectors, now);
+        self.camera.on_second(cameras, now);
+        for misfit in second.graph.misfits.iter().take(MOST_MISFITS) {
+            let (fault, words) = match misfit {
+                Misfit::Qos(words) => (Fault::IncompatibleQos, words),
+                Misfit::Type(words) => (Fault::WrongType, words),
+            };
+            self.faults.see_of(fault, words, words, now);
+        }
+        self.watch_inputs(detectors, cameras, now);
+        self.watch_clock(second.clock_jump, second.clock_missing, now);
+        for (topic, reason) in second.dropped {
+            let words = format!("not all is published on {topic}: {reason}");
+            self.faults
+                .see_of(Fault::DroppedOutput, &topic, &words, now);
+        }
+        self.faults.end_unseen(now);
+    }
+
+    fn watch_inputs(&mut self, detectors: usize, cameras: usize, now: Instant) {
+        let (detections, camera) = (&self.detections_topic, &self.camera_topic);
+        let silence_s = SILENCE.as_secs();
+        let silent = |topic: &str, publishers: usize| {
+            format!(
+                "nothing of {topic} has come for {silence_s} s, though {publishers} publisher(s) fit"
+            )
+        };
+        if self.detections.silent(now) {
+            let words = silent(detections, detectors);
+            self.faults
+                .see_of(Fault::SilentPublisher, detections, &words, now);
+        }
+        if !self.camera.ever() && self.camera.silent(now) {
+            let words = format!(
+                "{}; one that sends it only once needs durability transient_local on both sides (see qos_overrides)",
+                silent(camera, cameras)
+            );
+            self.faults
+                .see_of(Fault::SilentPublisher, camera, &words, now);
+        }
+        if detectors == 0 && !self.detections.recent(now) {
+            let ever = self.detections.ever();
+            if ever || (self.camera.recent(now) && is_long(self.begin, now)) {
+                let words = if ever {
+                    format!("{detections} have stopped: their publisher is gone")
+                } else {
+                    format!("{camera} comes, but no publisher of {detections} fits")
+                };
+                self.faults.see(Fault::NoDetections, &words, now);
+            }
+        }
+        if self.camera.was_steady && !self.camera.recent(now) && self.detections.recent(now) {
+            let words = format!(
+                "{camera} came steadily, but not for {silence_s} s now, while detections do ({cameras} publisher(s)): \
+                 the last one still counts"
+            );
+            self.faults.see(Fault::StaleCameraInfo, &words, now);
+        }
+        if self.detections.ever() {
+            if std::mem::take(&mut self.waiting_said) {
+                log::info!("{detections} arrive");
+            }
+        } else if detectors == 0
+            && !self.waiting_said
+            && now.saturating_duration_since(self.begin) >= WAIT
+        {
+            self.waiting_said = true;
+            let topic = detections.trim_start_matches('/');
+            log::info!("waiting for {topic}: nobody publishes them yet");
+        }
+    }
+
+    fn watch_clock(&mut self, jump: Option<String>, missing: bool, now: Instant) {
+        if let Some(jump) = jump {
+            let words = format!("/clock went {jump}");
+            self.faults.see(Fault::ClockJump, &words, now);
+        }
+        self.clock_missing_since = if missing {
+            self.clock_missing_since.or(Some(now))
+        } else {
+            None
+        };
+        if self
+            .clock_missing_since
+            .is_some_and(|since| is_long(since, now))
+        {
+            let words = "use_sim_time is set, but no /clock has come: the node's time is zero";
+            self.faults.see(Fault::NoClock, words, now);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A watch with its own seconds.
+    struct Scene {
+        watch: Watch,
+        graph: Graph,
+        now: Instant,
+    }
+
+    impl Scene {
+        fn new() -> Self {
+            let now = Instant::now();
+            Self {
+                watch: Watch::new("/points".into(), "/camera".into(), now),
+                graph: Graph::default(),
+                now,
+            }
+        }
+
+        fn publishers(&mut self, topic: &str, count: usize) {
+            self.graph.heard.insert(topic.to_owned(), count);
+        }
+
+        /// Lets seconds pass, in each of which these arrive.
+        fn pass(&mut self, seconds: u64, detections: bool, camera: bool) -> Vec<Fault> {
+            for _ in 0..seconds {
+                self.now += Duration::from_secs(1);
+                if detections {
+                    self.watch.on_detections(self.now);
+                }
+                if camera {
+                    self.watch.on_camera_info(self.now);
+                }
+                let second = Second {
+                    graph: &self.graph,
+                    clock_jump: None,
+                    clock_missing: false,
+                    dropped: Vec::new(),
+                };
+                self.watch.on_second(second, self.now);
+            }
+            self.watch.faults.iter().map(|(fault, _)| fault).collect()
+        }
+    }
+
+    #[test]
+    fn silence_is_a_fault_when_somebody_could_speak_and_ends_with_a_word() {
+        let mut scene = Scene::new();
+        assert_eq!(scene.pass(60, false, false), [], "nobody is there");
+        scene.publishers("/points", 1);
+        assert_eq!(scene.pass(5, false, false), []);
+        assert_eq!(scene.pass(1, false, false), [Fault::SilentPublisher]);
+        assert_eq!(scene.pass(1, true, false), []);
+        assert_eq!(scene.pass(5, false, false), [Fault::SilentPublisher]);
+        scene.publishers("/points", 0);
+        assert_eq!(scene.pass(1, false, false), [Fault::NoDetections]);
+    }
+
+    #[test]
+    fn camera_without_detections_is_a_fault() {
+        let mut scene = Scene::new();
+        assert_eq!(scene.pass(4, false, true), []);
+        assert_eq!(scene.pass(1, false, true), [Fault::NoDetections]);
+        assert_eq!(scene.pass(1, true, true), []);
+    }
+
+    #[test]
+    fn steady_camera_info_gets_stale_and_a_latched_one_does_not() {
+        let mut scene = Scene::new();
+        assert_eq!(scene.pass(2, true, true), []);
+        assert_eq!(scene.pass(60, true, false), [], "it may be sent once");
+        assert_eq!(scene.pass(3, true, true), []);
+        assert_eq!(scene.pass(4, true, false), []);
+        assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo]);
+        assert_eq!(scene.pass(1, true, true), []);
+    }
+
+    #[test]
+    fn refusals_for_the_surroundings_last_until_they_are_answered() {
+        let mut scene = Scene::new();
+        let (watch, now) = (&mut scene.watch, scene.now);
+        assert!(watch.on_refusal(OutcomeCode::NoCameraInfo, "no camera", now));
+        assert!(watch.on_refusal(OutcomeCode::FrameMismatch, "frames", now));
+        assert!(!watch.on_refusal(OutcomeCode::UnknownId, "id", now));
+        let both = [Fault::NoCameraInfo, Fault::FrameMismatch];
+        assert_eq!(scene.pass(1, true, false), both);
+        assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
+        assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
+        scene.watch.on_image(Time { sec: 7, nanosec: 0 }, scene.now);
+        assert_eq!(scene.pass(1, true, true), []);
+    }
+}
