@@ -274,7 +274,8 @@ def test_services_belong_to_the_node_in_the_graph(client: Client, peer: Peer) ->
         return [name for name in services() if name.startswith(f"{NODE}/")]
 
     # Its endpoints are told one after the other.
-    peer.spin_until(lambda: len(own()) == 6, "six services of the node")
+    # Six for parameters, and reset.
+    peer.spin_until(lambda: len(own()) == 7, "seven services of the node")
 
     assert services()[f"{NODE}/describe_parameters"] == ["rcl_interfaces/srv/DescribeParameters"]
     response = peer.call(
