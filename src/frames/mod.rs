@@ -28,12 +28,14 @@
 //! assert_eq!(found.b_from_a.translation.vector, Vector3::new(20.0, 0.5, -2.0));
 //! ```
 
+mod attitude;
 mod axes;
 mod motion;
 mod pose;
 mod time;
 mod variance;
 
+pub use attitude::{AttitudeAt, AttitudeError, AttitudeHistory};
 pub use axes::{flu_from_optical, frd_from_flu, ned_from_enu, rotation_only};
 pub use pose::{LocalAttitude, PoseEstimate};
 pub use time::{TimeError, px4_us_from_ros_ns, ros_ns_from_px4_us};

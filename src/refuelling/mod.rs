@@ -1,7 +1,7 @@
 //! Where the receptacle is before the probe: the tanker's motion in the camera becomes what guidance
 //! flies to and what a boom operator would judge.
 //!
-//! Knows `geometry` and `frames`; never a clock or the filter. From the motion of the tanker in the
+//! Knows `geometry`, `frames` and `yaml`; never a clock or the filter. From the motion of the tanker in the
 //! camera, the camera's mount, the probe tip and the receptacle:
 //!
 //! ```text
@@ -16,9 +16,11 @@
 mod envelope;
 mod probability;
 mod receptacle;
+mod setup;
 
 pub use envelope::{Assessment, Envelope, EnvelopeError, EnvelopeState, Region};
 pub use receptacle::{ReceptacleEstimate, RefuellingGeometry, RefuellingGeometryError, Uncertain};
+pub use setup::{RefuellingSetup, RefuellingSetupError};
 
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,11 @@
 //! The receptacle relative to the probe tip, from the motion of the tanker in the camera.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Point3, SMatrix, Translation3, UnitQuaternion, Vector3,
+};
 
-use crate::geometry::{Motion, PoseCovariance, congruent, set, skew};
+use crate::frames::PoseEstimate;
+use crate::geometry::{Matrix12, Motion, PoseCovariance, congruent, set, skew};
 
 /// What is fixed to the two aircraft, from drawings and calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,17 +104,7 @@ impl RefuellingGeometry {
     /// * `camera_from_tanker`: the track, or its prediction at the time that matters.
     #[must_use]
     pub fn receptacle(&self, camera_from_tanker: &Motion) -> ReceptacleEstimate {
-        let tanker_from_receptacle = Isometry3::from_parts(
-            Translation3::from(self.receptacle_in_tanker),
-            UnitQuaternion::identity(),
-        );
-        let receiver_from_receptacle = camera_from_tanker
-            .of(&tanker_from_receptacle)
-            .seen_from(&self.receiver_from_camera);
-        let from_mount = receiver_from_receptacle.b_from_a.translation.vector
-            - self.receiver_from_camera.translation.vector;
-        let velocity = receiver_from_receptacle.velocity_in_b;
-
+        let receiver_from_receptacle = self.receptacle_motion(camera_from_tanker);
         let motion = &receiver_from_receptacle.covariance;
         let mut covariance = Matrix6::zeros();
         for (row, from_row) in [(0, 0), (3, 6)] {
@@ -122,25 +115,59 @@ impl RefuellingGeometry {
                 set(&mut covariance, row, column, &block);
             }
         }
-        // A mount turned by δθ turns the line of sight and the velocity: δr = δo + δθ × c, δv = δθ × v.
-        let mut of_mount = Matrix6::zeros();
-        set(&mut of_mount, 0, 0, &Matrix3::identity());
-        set(&mut of_mount, 0, 3, &-skew(from_mount));
-        set(&mut of_mount, 3, 3, &-skew(velocity));
-        covariance += congruent(&of_mount, &self.mount_covariance.0);
-        let receiver_from_tanker = receiver_from_receptacle
-            .b_from_a
-            .rotation
-            .to_rotation_matrix();
-        let swing = congruent(receiver_from_tanker.matrix(), &self.receptacle_covariance);
-        let mut position = covariance.fixed_view_mut::<3, 3>(0, 0);
-        position += swing;
-
         ReceptacleEstimate {
             receptacle_from_probe: receiver_from_receptacle.b_from_a.translation.vector
                 - self.probe_tip_in_receiver.coords,
-            velocity_in_receiver: velocity,
+            velocity_in_receiver: receiver_from_receptacle.velocity_in_b,
             covariance,
+        }
+    }
+
+    /// Returns the receptacle's motion in the receiver, about the receiver's origin: its attitude is that
+    /// of the tanker. The covariance holds that of the mount and of the receptacle too.
+    #[must_use]
+    pub fn receptacle_motion(&self, camera_from_tanker: &Motion) -> Motion {
+        let tanker_from_receptacle = Isometry3::from_parts(
+            Translation3::from(self.receptacle_in_tanker),
+            UnitQuaternion::identity(),
+        );
+        let mut found = camera_from_tanker
+            .of(&tanker_from_receptacle)
+            .seen_from(&self.receiver_from_camera);
+        let from_mount =
+            found.b_from_a.translation.vector - self.receiver_from_camera.translation.vector;
+        // A mount turned by δθ turns all that was seen: δt = δo + δθ × c, δv = δθ × v, δω = δθ × ω.
+        let mut of_mount = SMatrix::<f64, 12, 6>::zeros();
+        set(&mut of_mount, 0, 0, &Matrix3::identity());
+        set(&mut of_mount, 0, 3, &-skew(from_mount));
+        set(&mut of_mount, 3, 3, &Matrix3::identity());
+        set(&mut of_mount, 6, 3, &-skew(found.velocity_in_b));
+        set(&mut of_mount, 9, 3, &-skew(found.rate_in_b));
+        found.covariance += congruent(&of_mount, &self.mount_covariance.0);
+        let receiver_from_tanker = found.b_from_a.rotation.to_rotation_matrix();
+        let swing = congruent(receiver_from_tanker.matrix(), &self.receptacle_covariance);
+        let mut position = found.covariance.fixed_view_mut::<3, 3>(0, 0);
+        position += swing;
+        found
+    }
+
+    /// Returns the receptacle's pose in the receiver, as [`Self::receptacle_motion`] without the motion:
+    /// what one frame says, before any filter.
+    #[must_use]
+    pub fn receptacle_pose(&self, camera_from_tanker: &PoseEstimate) -> PoseEstimate {
+        let mut covariance = Matrix12::zeros();
+        covariance
+            .fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(&camera_from_tanker.covariance.0);
+        let at_rest = self.receptacle_motion(&Motion {
+            b_from_a: camera_from_tanker.b_from_a,
+            velocity_in_b: Vector3::zeros(),
+            rate_in_b: Vector3::zeros(),
+            covariance,
+        });
+        PoseEstimate {
+            b_from_a: at_rest.b_from_a,
+            covariance: at_rest.pose_covariance(),
         }
     }
 }

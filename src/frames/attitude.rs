@@ -1,0 +1,265 @@
+//! The receiver's attitude at the time of an image, from samples that an autopilot sent around it.
+
+use std::collections::VecDeque;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Samples kept: four seconds at 250 Hz, far more than any image is late.
+const KEPT: usize = 1000;
+/// rad/s; no aircraft turns faster, but an estimator that resets its heading does.
+const FASTEST_RADPS: f64 = 10.0;
+
+/// Attitude and rate of a body against local axes at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudeAt {
+    /// Takes vectors in the body's axes to local ones.
+    pub local_from_body: UnitQuaternion<f64>,
+    /// Against the local axes, in the body's axes, rad/s: the mean between the two samples nearest in time.
+    pub rate_in_body: Vector3<f64>,
+}
+
+/// Why there is no attitude for a stamp.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AttitudeError {
+    /// Fewer samples than a rate needs.
+    #[error("need 2 samples of the receiver's attitude, got {got}")]
+    TooFew {
+        /// Samples since the start, or since they began anew.
+        got: usize,
+    },
+    /// The newest sample is too old for the image.
+    #[error("the receiver's attitude is {age_s:.3} s older than the image, allowed is {limit_s} s")]
+    Stale {
+        /// s.
+        age_s: f64,
+        /// s.
+        limit_s: f64,
+    },
+    /// All samples are of later times.
+    #[error("the first attitude of the receiver is {by_s:.3} s later than the image")]
+    BeforeFirst {
+        /// s.
+        by_s: f64,
+    },
+    /// The two samples around the image are far apart.
+    #[error("{gap_s:.3} s between two attitudes of the receiver, allowed is {limit_s} s")]
+    Gap {
+        /// s.
+        gap_s: f64,
+        /// s.
+        limit_s: f64,
+    },
+    /// The two samples around the image say a rate that no aircraft has.
+    #[error(
+        "the receiver's attitude turns at {rate_radps:.1} rad/s, allowed is {limit_radps} rad/s"
+    )]
+    Jump {
+        /// rad/s.
+        rate_radps: f64,
+        /// rad/s.
+        limit_radps: f64,
+    },
+}
+
+/// The latest samples of an attitude, in the order of their stamps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttitudeHistory {
+    samples: VecDeque<(i64, UnitQuaternion<f64>)>,
+    limit_s: f64,
+}
+
+impl AttitudeHistory {
+    /// Returns an empty history. Two samples that are used together, and the newest sample and the image,
+    /// may be `limit_s` apart.
+    #[must_use]
+    pub fn new(limit_s: f64) -> Self {
+        Self {
+            samples: VecDeque::with_capacity(KEPT),
+            limit_s,
+        }
+    }
+
+    /// Takes a sample. One that is not later than the last is left out; one that is more than a second
+    /// earlier begins anew, since the source of the stamps has.
+    pub fn push(&mut self, stamp_ns: i64, local_from_body: UnitQuaternion<f64>) {
+        if let Some((last_ns, _)) = self.samples.back() {
+            if seconds(*last_ns, stamp_ns) > 1.0 {
+                self.samples.clear();
+            } else if stamp_ns <= *last_ns {
+                return;
+            }
+        }
+        if self.samples.len() == KEPT {
+            self.samples.pop_front();
+        }
+        self.samples.push_back((stamp_ns, local_from_body));
+    }
+
+    /// Forgets all samples: the attitude has been corrected by a jump.
+    pub fn clear(&mut self) {
+        self.samples.clear();
+    }
+
+    /// Returns the attitude at a stamp: between two samples, or a little after the last one at the rate of
+    /// the last two.
+    ///
+    /// # Errors
+    /// [`AttitudeError`] says what is missing; nothing is ever taken from a sample further away.
+    pub fn at(&self, stamp_ns: i64) -> Result<AttitudeAt, AttitudeError> {
+        let (got, limit_s) = (self.samples.len(), self.limit_s);
+        let later = self
+            .samples
+            .partition_point(|(sample_ns, _)| *sample_ns < stamp_ns);
+        let (Some(first), Some(last)) = (self.samples.front(), self.samples.back()) else {
+            return Err(AttitudeError::TooFew { got });
+        };
+        if later == 0 && first.0 != stamp_ns {
+            return Err(AttitudeError::BeforeFirst {
+                by_s: seconds(first.0, stamp_ns),
+            });
+        }
+        let age_s = seconds(stamp_ns, last.0);
+        if age_s > limit_s {
+            return Err(AttitudeError::Stale { age_s, limit_s });
+        }
+        let second = later.clamp(1, got.saturating_sub(1).max(1));
+        let (Some((from_ns, from)), Some((to_ns, to))) =
+            (self.samples.get(second - 1), self.samples.get(second))
+        else {
+            return Err(AttitudeError::TooFew { got });
+        };
+        let gap_s = seconds(*to_ns, *from_ns);
+        if gap_s > limit_s {
+            return Err(AttitudeError::Gap { gap_s, limit_s });
+        }
+        let rate_in_body = (from.inverse() * to).scaled_axis() / gap_s;
+        let rate_radps = rate_in_body.norm();
+        if rate_radps > FASTEST_RADPS {
+            return Err(AttitudeError::Jump {
+                rate_radps,
+                limit_radps: FASTEST_RADPS,
+            });
+        }
+        let turned = UnitQuaternion::from_scaled_axis(rate_in_body * seconds(stamp_ns, *from_ns));
+        Ok(AttitudeAt {
+            local_from_body: from * turned,
+            rate_in_body,
+        })
+    }
+}
+
+/// Returns `later − earlier`; stamps from anywhere cannot overflow it.
+fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
+    // Whole nanoseconds first: the difference of two doubles would lose them.
+    (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+    const LIMIT_S: f64 = 0.05;
+    /// rad and rad/s, of a few products near one.
+    const ROUNDING: f64 = 1e-12;
+
+    fn turning(at_ns: i64) -> UnitQuaternion<f64> {
+        let start = UnitQuaternion::from_euler_angles(0.1, -0.3, 2.0);
+        start * UnitQuaternion::from_scaled_axis(rate() * (at_ns as f64 * 1e-9))
+    }
+
+    fn rate() -> Vector3<f64> {
+        Vector3::new(0.2, -0.1, 0.4)
+    }
+
+    fn history(stamps_ms: &[i64]) -> AttitudeHistory {
+        let mut history = AttitudeHistory::new(LIMIT_S);
+        for stamp in stamps_ms {
+            history.push(stamp * MS, turning(stamp * MS));
+        }
+        history
+    }
+
+    #[test]
+    fn a_steady_turn_is_followed_between_and_a_little_after_the_samples() {
+        let history = history(&[100, 120, 140, 160]);
+        for stamp_ms in [100, 101, 120, 133, 160, 175, 210] {
+            let found = history.at(stamp_ms * MS).expect("near the samples");
+            let error = found.local_from_body.inverse() * turning(stamp_ms * MS);
+            assert!(error.scaled_axis().norm() < ROUNDING, "{stamp_ms} ms");
+            assert!((found.rate_in_body - rate()).norm() < 1e-9, "{stamp_ms} ms");
+        }
+    }
+
+    #[test]
+    fn what_is_not_near_the_image_in_time_is_not_used() {
+        let few = history(&[100]);
+        assert_eq!(few.at(100 * MS), Err(AttitudeError::TooFew { got: 1 }));
+        assert_eq!(history(&[]).at(0), Err(AttitudeError::TooFew { got: 0 }));
+        let sparse = history(&[100, 200, 220]);
+        assert!(matches!(
+            sparse.at(99 * MS),
+            Err(AttitudeError::BeforeFirst { .. })
+        ));
+        assert!(matches!(
+            sparse.at(150 * MS),
+            Err(AttitudeError::Gap { .. })
+        ));
+        assert!(sparse.at(210 * MS).is_ok());
+        assert!(sparse.at(270 * MS).is_ok());
+        assert!(matches!(
+            sparse.at(271 * MS),
+            Err(AttitudeError::Stale { .. })
+        ));
+    }
+
+    #[test]
+    fn a_jump_of_the_attitude_gives_nothing_until_it_is_past() {
+        let mut history = history(&[100, 120]);
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 1.0));
+        for stamp in [140, 160] {
+            history.push(stamp * MS, turn * turning(stamp * MS));
+        }
+        assert!(matches!(
+            history.at(130 * MS),
+            Err(AttitudeError::Jump { .. })
+        ));
+        assert!(history.at(150 * MS).is_ok());
+        history.clear();
+        assert_eq!(history.at(150 * MS), Err(AttitudeError::TooFew { got: 0 }));
+    }
+
+    #[test]
+    fn stamps_that_repeat_are_left_out_and_a_restart_begins_anew() {
+        let mut history = history(&[5000, 5020]);
+        history.push(5020 * MS, UnitQuaternion::identity());
+        history.push(5010 * MS, UnitQuaternion::identity());
+        let found = history.at(5015 * MS).expect("two samples");
+        assert!((found.rate_in_body - rate()).norm() < 1e-9);
+        history.push(1000 * MS, turning(1000 * MS));
+        assert_eq!(history.at(1000 * MS), Err(AttitudeError::TooFew { got: 1 }));
+    }
+
+    #[test]
+    fn any_stamps_are_answered() {
+        let mut history = AttitudeHistory::new(LIMIT_S);
+        for stamp in [i64::MIN, 0, i64::MAX] {
+            history.push(stamp, UnitQuaternion::identity());
+            for asked in [i64::MIN, -1, 0, i64::MAX] {
+                let _ = history.at(asked);
+            }
+        }
+        assert!(history.at(0).is_err());
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let mut history = AttitudeHistory::new(LIMIT_S);
+        for stamp in 0..5000 {
+            history.push(stamp * MS, UnitQuaternion::identity());
+        }
+        assert_eq!(history.samples.len(), KEPT);
+        assert!(history.at(4999 * MS).is_ok());
+    }
+}
