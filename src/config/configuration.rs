@@ -2,7 +2,7 @@
 
 use nalgebra::Rotation3;
 
-use super::{Parameters, Settings};
+use super::{ConsumerConfiguration, Parameters, Settings};
 use crate::estimation::{EstimatorSettings, Initialisation, Refinement};
 use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
 use crate::tracking::FilterSettings;
@@ -32,6 +32,8 @@ pub struct Configuration {
     pub input: Input,
     /// Most corrected bits of a tag.
     pub max_hamming: i32,
+    /// What refuelling and flight stacks are told.
+    pub consumers: ConsumerConfiguration,
 }
 
 /// Which messages bring the detections.
@@ -69,6 +71,7 @@ impl From<&Parameters> for Configuration {
                 _ => Input::FeaturePoints,
             },
             max_hamming: i32::try_from(parameters.count("max_hamming")).unwrap_or(0),
+            consumers: ConsumerConfiguration::from(parameters),
         }
     }
 }
@@ -113,18 +116,19 @@ fn filter_settings(parameters: &Parameters) -> FilterSettings {
 /// `camera_from_tanker = optical_from_body · receiver_from_camera_bodyᵀ · receiver_from_tanker`:
 /// the angles turn bodies with x forward, y left, z up; the optical frame looks along that x.
 fn nominal_camera_from_tanker(parameters: &Parameters) -> Rotation3<f64> {
-    let turned = |prefix: &str| {
-        let angle = |axis: &str| {
-            parameters
-                .double(&format!("{prefix}_{axis}_deg"))
-                .to_radians()
-        };
-        // Rz(yaw) Ry(pitch) Rx(roll)
-        rotation_from_roll_pitch_yaw(angle("roll"), angle("pitch"), angle("yaw"))
-    };
-    let receiver_from_tanker = turned("nominal");
-    let receiver_from_camera_body = turned("camera_mount");
+    let receiver_from_tanker = turned(parameters, "nominal");
+    let receiver_from_camera_body = turned(parameters, "camera_mount");
     optical_from_body() * receiver_from_camera_body.inverse() * receiver_from_tanker
+}
+
+/// Returns the rotation that three parameters of this prefix say: Rz(yaw) Ry(pitch) Rx(roll).
+pub(super) fn turned(parameters: &Parameters, prefix: &str) -> Rotation3<f64> {
+    let angle = |axis: &str| {
+        parameters
+            .double(&format!("{prefix}_{axis}_deg"))
+            .to_radians()
+    };
+    rotation_from_roll_pitch_yaw(angle("roll"), angle("pitch"), angle("yaw"))
 }
 
 #[cfg(test)]

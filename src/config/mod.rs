@@ -6,11 +6,13 @@
 
 mod check;
 mod configuration;
+mod consumers;
 mod parameters;
 mod table;
 mod value;
 
 pub use configuration::{Configuration, Input};
+pub use consumers::{AttitudeSource, ConsumerConfiguration, MissingForOutput};
 pub use parameters::Parameters;
 pub use table::{Kind, ParameterSpec, TABLE};
 pub use value::{ParameterError, ParameterValue};

@@ -71,11 +71,15 @@ impl Parameters {
         }
     }
 
-    pub(super) fn count(&self, name: &str) -> usize {
+    pub(super) fn integer(&self, name: &str) -> i64 {
         match self.get(name) {
-            Some(ParameterValue::Integer(value)) => usize::try_from(*value).unwrap_or(0),
+            Some(ParameterValue::Integer(value)) => *value,
             other => unreachable_kind(name, other),
         }
+    }
+
+    pub(super) fn count(&self, name: &str) -> usize {
+        usize::try_from(self.integer(name)).unwrap_or(0)
     }
 
     pub(super) fn text(&self, name: &str) -> &str {

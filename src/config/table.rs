@@ -116,6 +116,16 @@ const fn angle(name: &'static str, description: &'static str) -> ParameterSpec {
     }
 }
 
+/// An output that is off unless asked for.
+const fn output(name: &'static str, description: &'static str) -> ParameterSpec {
+    ParameterSpec {
+        name,
+        kind: Kind::Bool { default: false },
+        read_only: true,
+        description,
+    }
+}
+
 /// All parameters. `config/tanker_pose.yaml` shows them to people; a test holds the two together.
 pub const TABLE: &[ParameterSpec] = &[
     ParameterSpec {
@@ -212,6 +222,91 @@ pub const TABLE: &[ParameterSpec] = &[
         "camera_mount_yaw_deg",
         "deg, yaw of the camera in the receiver; positive: it looks left",
     ),
+    ParameterSpec {
+        name: "refuelling",
+        kind: Kind::Text { default: "none" },
+        read_only: true,
+        description: "none, or the path of a YAML file with camera, probe tip, receptacle and envelope; \
+                      the outputs after it need one",
+    },
+    ParameterSpec {
+        name: "receiver_frame_id",
+        kind: Kind::FrameId {
+            default: "receiver",
+        },
+        read_only: true,
+        description: "frame of receptacle; axes x forward, y left, z up, fixed to the receiver",
+    },
+    output(
+        "publish_receptacle",
+        "publish receptacle: where the receptacle is before the probe tip, closing speed, envelope",
+    ),
+    output(
+        "publish_px4_landing_target",
+        "publish /fmu/in/landing_target_pose from the track, NED; needs attitude",
+    ),
+    output(
+        "publish_px4_fiducial_marker",
+        "publish /fmu/in/fiducial_marker_pos_report from single frames, FRD; needs attitude",
+    ),
+    output(
+        "publish_mavros_landing_target",
+        "publish /mavros/landing_target/raw from single frames, which MAVROS turns into BODY_FRD",
+    ),
+    output(
+        "publish_mavros_pose",
+        "publish /mavros/landing_target/pose from single frames, ENU; needs attitude",
+    ),
+    ParameterSpec {
+        name: "attitude",
+        kind: Kind::Choice {
+            default: "none",
+            allowed: &["none", "px4", "imu"],
+        },
+        read_only: true,
+        description: "where the receiver's attitude comes from: none, /fmu/out/vehicle_attitude \
+                      (px4_msgs/VehicleAttitude) or /mavros/imu/data (sensor_msgs/Imu, ENU)",
+    },
+    ParameterSpec {
+        name: "attitude_max_age_s",
+        kind: Kind::Double {
+            default: 0.05,
+            min: 0.001,
+            max: 1.0,
+        },
+        read_only: true,
+        description: "s, farthest that an attitude may be from the image, and two attitudes from each other",
+    },
+    ParameterSpec {
+        name: "attitude_sigma_deg",
+        kind: Kind::Double {
+            default: 1.0,
+            min: 0.001,
+            max: 30.0,
+        },
+        read_only: true,
+        description: "deg, standard deviation of the receiver's attitude on each axis",
+    },
+    ParameterSpec {
+        name: "attitude_rate_sigma_dps",
+        kind: Kind::Double {
+            default: 1.0,
+            min: 0.001,
+            max: 100.0,
+        },
+        read_only: true,
+        description: "deg/s, standard deviation of the receiver's rate on each axis",
+    },
+    ParameterSpec {
+        name: "px4_minus_ros_us",
+        kind: Kind::Integer {
+            default: 0,
+            min: -9_000_000_000_000_000,
+            max: 9_000_000_000_000_000,
+        },
+        read_only: true,
+        description: "us, what PX4's clock shows more than ROS's; 0 where the bridge translates the times",
+    },
     ParameterSpec {
         name: "refinement",
         kind: Kind::Choice {

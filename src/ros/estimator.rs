@@ -4,7 +4,9 @@ use std::time::{Duration, Instant};
 
 use ros2_client::{Publisher, WriteError};
 
+use super::attitude::AttitudeMessage;
 use super::clock::NodeClock;
+use super::consumers::Consumers;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
@@ -15,11 +17,11 @@ use super::messages::{
     PoseWithCovarianceStamped, TFMessage,
 };
 use super::once::SaidOnce;
-use crate::config::Settings;
+use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
 use crate::pipeline::{
-    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp,
+    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp, TrackCode,
 };
 use crate::tracking::TrackOutcome;
 
@@ -37,7 +39,7 @@ impl<M: Message> Output<M> {
         Self { publisher, topic }
     }
 
-    fn publish(&mut self, message: M, tally: &mut Tally) {
+    pub(super) fn publish(&mut self, message: M, tally: &mut Tally) {
         if let Err(error) = self.publisher.publish(message) {
             let reason = match error {
                 WriteError::WouldBlock { .. } => "a subscriber does not keep up".to_owned(),
@@ -64,6 +66,8 @@ pub struct Outputs {
     pub markers: Option<Output<MarkerArray>>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
+    /// What refuelling and flight stacks are told, if wanted.
+    pub consumers: Option<Consumers>,
 }
 
 /// The pipeline between its messages.
@@ -171,6 +175,11 @@ impl Estimator {
                 .pose
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);
             self.publish_transform(&header, solution);
+            if let Some(consumers) = &mut self.outputs.consumers {
+                let corrected = outcome.track.code() == TrackCode::Updated;
+                let motion = outcome.track.motion.as_ref().filter(|_| corrected);
+                consumers.on_pose(&header, solution, motion, &mut self.tally);
+            }
         }
         self.publish_odometry(&header, &outcome);
         let mut status = convert::status(header.clone(), &outcome, solve_time);
@@ -210,9 +219,19 @@ impl Estimator {
         (frame, outcome)
     }
 
-    /// Takes changed settings, for the next frame on.
-    pub fn on_settings(&mut self, settings: Settings) {
-        self.pipeline.set_settings(settings);
+    /// Takes a sample of the receiver's attitude.
+    pub fn on_attitude(&mut self, message: &AttitudeMessage) {
+        if let Some(consumers) = &mut self.outputs.consumers {
+            consumers.on_attitude(message);
+        }
+    }
+
+    /// Takes changed parameters, for the next frame on.
+    pub fn on_configuration(&mut self, configuration: Configuration) {
+        if let Some(consumers) = &mut self.outputs.consumers {
+            consumers.on_configuration(&configuration.consumers);
+        }
+        self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
         self.note_camera();
     }
@@ -259,7 +278,10 @@ impl Estimator {
             faults: &self.watch.faults,
         };
         let elapsed = now.saturating_duration_since(self.last_report);
-        let report = self.reporter.report(&self.tally, elapsed, &situation);
+        let mut report = self.reporter.report(&self.tally, elapsed, &situation);
+        if let Some(consumers) = &mut self.outputs.consumers {
+            report.status.push(consumers.diagnostics(&self.node));
+        }
         self.outputs.diagnostics.publish(report, &mut self.tally);
         self.last_refusal = None;
         self.slowest = Duration::ZERO;

@@ -10,6 +10,7 @@
 //! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
 //! graph, health                      the other ends of the topics; faults around the node, said and shown
+//! consumers, attitude                what refuelling and flight stacks are told, by the receiver's attitude
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
 //! node, serve                        all of it together, until a signal or a tool ends it
@@ -18,7 +19,9 @@
 //! Tools that talk ROS start from [`participant::RosNode::open`].
 
 pub mod arguments;
+pub mod attitude;
 pub mod clock;
+pub mod consumers;
 pub mod convert;
 pub mod diagnostics;
 pub mod environment;

@@ -9,7 +9,9 @@ use futures::StreamExt;
 use ros2_client::NodeOptions;
 
 use super::arguments::Arguments;
+use super::attitude::{self, AttitudeSubscription};
 use super::clock::NodeClock;
+use super::consumers::{self, Consumers, ConsumersError};
 use super::environment::Environment;
 use super::estimator::{Estimator, Output, Outputs};
 use super::health::Watch;
@@ -28,6 +30,7 @@ use super::serve::Server;
 use super::start_values::{StartParameterError, start_values};
 use crate::config::Configuration;
 use crate::pipeline::Pipeline;
+use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
 
 /// What the node is called unless it is remapped.
@@ -75,6 +78,9 @@ pub enum NodeError {
     /// The marker map cannot be used.
     #[error("parameter \"marker_map\": {0}")]
     Map(#[from] MarkerMapError),
+    /// An output for refuelling or a flight stack lacks what it needs.
+    #[error(transparent)]
+    Consumers(#[from] ConsumersError),
     /// Signals cannot be caught.
     #[error("cannot listen for SIGINT and SIGTERM: {0}")]
     Signals(std::io::Error),
@@ -121,6 +127,7 @@ pub fn run_until(
     } else {
         Some(marker_map(&configuration.marker_map)?)
     };
+    let setup = consumers::refuelling_setup(&configuration.consumers)?;
 
     let options = NodeOptions::new().start_parameter_services(false);
     let mut ros = RosNode::open(NODE_NAME, arguments, environment, options)?;
@@ -135,7 +142,7 @@ pub fn run_until(
     let served = server
         .follow_clock(configuration.use_sim_time)
         .and_then(|()| match map {
-            Some(map) => server.start(&configuration, map),
+            Some(map) => server.start(&configuration, map, setup),
             None => server.start_managed(),
         })
         // Parameters last: who finds the services finds the topics too.
@@ -171,6 +178,25 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
         (MARKERS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
         ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
+        (attitude::VEHICLE_ATTITUDE, Role::Subscription, &INPUT),
+        (attitude::IMU, Role::Subscription, &INPUT),
+        (consumers::RECEPTACLE, Role::Publisher, &consumers::QOS),
+        (
+            consumers::PX4_LANDING_TARGET,
+            Role::Publisher,
+            &consumers::QOS,
+        ),
+        (
+            consumers::PX4_FIDUCIAL_MARKER,
+            Role::Publisher,
+            &consumers::QOS,
+        ),
+        (
+            consumers::MAVROS_LANDING_TARGET,
+            Role::Publisher,
+            &consumers::QOS,
+        ),
+        (consumers::MAVROS_POSE, Role::Publisher, &consumers::QOS),
     ]
     .into_iter()
     .map(|(topic, role, qos)| endpoint(topic, role, qos))
@@ -238,6 +264,7 @@ pub(super) fn introduce(
 pub(super) struct Inputs {
     pub(super) detections: InputSubscription,
     pub(super) camera_info: Subscription<CameraInfo>,
+    pub(super) attitude: AttitudeSubscription,
     /// That of the detections.
     pub(super) topic: &'static str,
 }
@@ -246,6 +273,7 @@ pub(super) struct Inputs {
 pub(super) fn open_topics(
     ros: &mut RosNode,
     configuration: &Configuration,
+    setup: Option<RefuellingSetup>,
 ) -> Result<(Inputs, Outputs), EndpointError> {
     let transform = if configuration.publish_tf {
         Some(output(ros, "/tf", &TRANSFORMS)?)
@@ -265,10 +293,12 @@ pub(super) fn open_topics(
         transform,
         markers,
         diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
+        consumers: Consumers::open(ros, &configuration.consumers, setup)?,
     };
     // Inputs last: what arrives can be answered.
     let inputs = Inputs {
         camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
+        attitude: AttitudeSubscription::open(ros, configuration.consumers.attitude, &INPUT)?,
         detections: InputSubscription::open(ros, configuration.input, &INPUT)?,
         topic: configuration.input.topic(),
     };

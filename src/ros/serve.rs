@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 
 use super::clock::{NodeClock, SimTime};
+use super::consumers::refuelling_setup;
 use super::environment::Environment;
 use super::estimator::{Estimator, Outputs};
 use super::lifecycle::{Lifecycle, Request, State, WorkResult};
@@ -16,6 +17,7 @@ use super::node::{
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
 use crate::config::Configuration;
+use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
 
 /// What stands between the topics.
@@ -78,8 +80,9 @@ impl<'a> Server<'a> {
         &mut self,
         configuration: &Configuration,
         map: MarkerMap,
+        setup: Option<RefuellingSetup>,
     ) -> Result<(), EndpointError> {
-        self.configure(configuration, map)?;
+        self.configure(configuration, map, setup)?;
         self.activate(true);
         Ok(())
     }
@@ -117,8 +120,9 @@ impl<'a> Server<'a> {
         };
         let camera_infos = inputs.camera_info.async_stream();
         let (detections, topic) = (inputs.detections.stream(), inputs.topic);
+        let attitudes = inputs.attitude.stream();
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        pin_mut!(camera_infos, detections, seconds);
+        pin_mut!(camera_infos, attitudes, detections, seconds);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
@@ -130,6 +134,10 @@ impl<'a> Server<'a> {
                 sample = camera_infos.select_next_some() => self.with(|estimator| match &sample {
                     Ok((message, _)) => estimator.on_camera_info(message),
                     Err(error) => estimator.on_undecodable(CAMERA_INFO, error),
+                }),
+                sample = attitudes.select_next_some() => self.with(|estimator| match sample {
+                    Ok(message) => estimator.on_attitude(&message),
+                    Err(error) => estimator.on_undecodable("attitude", &error),
                 }),
                 _ = seconds.select_next_some() => {
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
@@ -163,7 +171,7 @@ impl<'a> Server<'a> {
         if let Err(error) = self.follow_clock(configuration.use_sim_time) {
             log::error!("use_sim_time has no effect: {error}");
         }
-        self.with(|estimator| estimator.on_settings(configuration.settings));
+        self.with(|estimator| estimator.on_configuration(configuration));
     }
 
     fn on_request(&mut self, request: &Request) {
@@ -187,14 +195,16 @@ impl<'a> Server<'a> {
 
     fn configure_as_asked(&mut self) -> WorkResult {
         let configuration = Configuration::from(&self.parameters.snapshot());
-        let map = match marker_map(&configuration.marker_map) {
-            Ok(map) => map,
+        let prepared = marker_map(&configuration.marker_map)
+            .and_then(|map| Ok((map, refuelling_setup(&configuration.consumers)?)));
+        let (map, setup) = match prepared {
+            Ok(prepared) => prepared,
             Err(error) => {
                 log::error!("cannot be configured: {error}");
                 return WorkResult::Failure;
             }
         };
-        match self.configure(&configuration, map) {
+        match self.configure(&configuration, map, setup) {
             Ok(()) => WorkResult::Success,
             Err(error) => {
                 log::error!("cannot be configured: {}", NodeError::from(error));
@@ -207,12 +217,13 @@ impl<'a> Server<'a> {
         &mut self,
         configuration: &Configuration,
         map: MarkerMap,
+        setup: Option<RefuellingSetup>,
     ) -> Result<(), EndpointError> {
         self.clean_up();
         let outputs = match std::mem::replace(&mut self.work, Work::Closed) {
             Work::Idle(outputs) => *outputs,
             Work::Closed | Work::Ready(_) => {
-                let (inputs, outputs) = open_topics(self.ros, configuration)?;
+                let (inputs, outputs) = open_topics(self.ros, configuration, setup)?;
                 self.inputs = Some(inputs);
                 outputs
             }

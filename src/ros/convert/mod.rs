@@ -1,7 +1,9 @@
 //! Messages <-> plain types. Nothing is checked and nothing rounded: stamps pass as their two fields.
 
 mod apriltags;
+mod flight_stacks;
 mod markers;
+mod receptacle;
 mod tools;
 mod vision;
 
@@ -16,7 +18,12 @@ use crate::geometry::{Motion, PoseCovariance};
 use crate::pipeline::{Detection, FrameOutcome, Stamp};
 
 pub use apriltags::{TagDetections, tag_detections};
+pub use flight_stacks::{
+    FlightStackError, imu_attitude, mavros_landing_target, mavros_pose, px4_attitude,
+    px4_fiducial_marker, px4_landing_target,
+};
 pub use markers::markers;
+pub use receptacle::receptacle;
 pub use tools::{camera_info_message, feature_points_message, isometry, pose_message};
 pub use vision::vision_detections;
 

@@ -8,15 +8,19 @@ use serde::{Deserialize, Serialize};
 
 mod detectors;
 mod estimator_status;
+mod flight_stacks;
 mod lifecycle;
 mod parameters;
+mod receptacle_state;
 mod standard;
 mod visualization;
 
 pub use detectors::*;
 pub use estimator_status::EstimatorStatus;
+pub use flight_stacks::*;
 pub use lifecycle::*;
 pub use parameters::*;
+pub use receptacle_state::ReceptacleState;
 pub use standard::*;
 pub use visualization::*;
 
@@ -74,4 +78,10 @@ ros_message!(
     "apriltag_msgs" / AprilTagDetectionArray,
     "tanker_pose" / FeaturePointArray,
     "tanker_pose" / EstimatorStatus,
+    "tanker_pose" / ReceptacleState,
+    "sensor_msgs" / Imu,
+    "px4_msgs" / LandingTargetPose,
+    "px4_msgs" / FiducialMarkerPosReport,
+    "px4_msgs" / VehicleAttitude,
+    "mavros_msgs" / LandingTarget,
 );

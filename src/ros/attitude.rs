@@ -1,0 +1,84 @@
+//! The topic that brings the receiver's attitude, of one of two types, or none.
+
+use std::pin::Pin;
+
+use futures::StreamExt;
+use futures::stream::{self, FusedStream};
+use ros2_client::{ReadError, Subscription};
+
+use super::messages::{Imu, VehicleAttitude};
+use super::participant::{EndpointError, QosProfile, RosNode};
+use crate::config::AttitudeSource;
+
+/// PX4's attitude.
+pub const VEHICLE_ATTITUDE: &str = "/fmu/out/vehicle_attitude";
+/// MAVROS's attitude.
+pub const IMU: &str = "/mavros/imu/data";
+
+impl AttitudeSource {
+    /// Returns the name of its topic.
+    #[must_use]
+    pub const fn topic(self) -> &'static str {
+        match self {
+            Self::Px4 => VEHICLE_ATTITUDE,
+            Self::Imu => IMU,
+        }
+    }
+}
+
+/// One sample, as a flight stack sends it.
+#[derive(Debug)]
+pub enum AttitudeMessage {
+    /// `px4_msgs/VehicleAttitude`.
+    Px4(VehicleAttitude),
+    /// `sensor_msgs/Imu`.
+    Imu(Imu),
+}
+
+/// The topic, if there is one.
+pub enum AttitudeSubscription {
+    /// Nothing needs an attitude.
+    None,
+    /// `px4_msgs/VehicleAttitude`.
+    Px4(Subscription<VehicleAttitude>),
+    /// `sensor_msgs/Imu`.
+    Imu(Subscription<Imu>),
+}
+
+/// The samples, in order; without a topic it never yields.
+pub type AttitudeStream<'a> =
+    Pin<Box<dyn FusedStream<Item = Result<AttitudeMessage, ReadError>> + 'a>>;
+
+impl AttitudeSubscription {
+    /// Returns the subscription to the source's topic.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the name is malformed or the middleware refuses.
+    pub fn open(
+        ros: &mut RosNode,
+        source: Option<AttitudeSource>,
+        qos: &QosProfile,
+    ) -> Result<Self, EndpointError> {
+        Ok(match source {
+            None => Self::None,
+            Some(source @ AttitudeSource::Px4) => Self::Px4(ros.subscription(source.topic(), qos)?),
+            Some(source @ AttitudeSource::Imu) => Self::Imu(ros.subscription(source.topic(), qos)?),
+        })
+    }
+
+    /// Returns its samples.
+    #[must_use]
+    pub fn stream(&self) -> AttitudeStream<'_> {
+        match self {
+            Self::None => Box::pin(stream::pending()),
+            Self::Px4(subscription) => {
+                let samples = subscription.async_stream();
+                Box::pin(samples.map(|sample| Ok(AttitudeMessage::Px4(sample?.0))))
+            }
+            Self::Imu(subscription) => {
+                let samples = subscription.async_stream();
+                Box::pin(samples.map(|sample| Ok(AttitudeMessage::Imu(sample?.0))))
+            }
+        }
+    }
+}
