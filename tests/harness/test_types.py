@@ -5,11 +5,12 @@ import sys
 from pathlib import Path
 
 import apriltag_msgs.msg
+import px4_msgs.msg
 import pytest
 import tanker_pose.msg
 import tf2_msgs.msg
 import vision_msgs.msg
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from harness.processes import REPOSITORY
 from harness.typestore import typestore
@@ -29,8 +30,8 @@ def built_hash(package: str, name: str) -> str:
     return entry["hash_string"]
 
 
-def test_the_contract_has_three_messages() -> None:
-    assert OURS == ["EstimatorStatus", "FeaturePoint", "FeaturePointArray"]
+def test_the_contract_has_four_messages() -> None:
+    assert OURS == ["EstimatorStatus", "FeaturePoint", "FeaturePointArray", "ReceptacleState"]
 
 
 @pytest.mark.parametrize("name", OURS)
@@ -64,3 +65,41 @@ def test_the_definitions_of_detectors_in_our_fixtures_are_those_released(binding
 
     assert hasattr(bindings, name)
     assert built_hash(package, name) == RELEASED[full_name]
+
+
+# As in px4_msgs of PX4 1.17, read from C code that rosidl generated; VehicleAttitude is that of 1.14 and later.
+FLIGHT_STACKS = {
+    "FiducialMarkerPosReport": (
+        "RIHS01_eef4e25987707a585d07effb6c4c7211ac7929242ce79be395832e83aa599206"
+    ),
+    "LandingTargetPose": "RIHS01_591546a7f5429d64febc6ed8fe478544aa4b2f537fb6b91f7bda35cbc82eec17",
+    "VehicleAttitude": "RIHS01_9af74ac6c01335f3a8612e3579d4eaa89a9d81550d933ed057f5d6252dc7e50c",
+}
+
+
+@pytest.mark.parametrize("name", FLIGHT_STACKS)
+def test_the_definitions_of_px4_in_our_fixtures_are_those_released(name: str) -> None:
+    assert hasattr(px4_msgs.msg, name)
+    assert built_hash("px4_msgs", name) == FLIGHT_STACKS[name]
+
+
+def test_older_px4_reads_the_same_landing_target_but_for_the_padding() -> None:
+    # PX4 1.14 to 1.16 have no rel_vel_ekf2_valid: in CDR it lies where theirs has padding.
+    text = (REPOSITORY / "tests/harness/fixtures/px4_msgs/msg/LandingTargetPose.msg").read_text()
+    older = get_typestore(Stores.EMPTY)
+    name = "px4_msgs/msg/LandingTargetPose"
+    older.register(get_types_from_msg(text.replace("bool rel_vel_ekf2_valid\n", ""), name))
+    newer = get_typestore(Stores.EMPTY)
+    newer.register(get_types_from_msg(text, name))
+    fields = [line.split() for line in text.splitlines()]
+    values = {
+        field: kind == "bool" if kind == "bool" else index
+        for index, (kind, field) in enumerate(fields, start=1)
+    } | {"rel_vel_ekf2_valid": False}
+    sent = newer.serialize_cdr(newer.types[name](**values), name)
+
+    read = older.deserialize_cdr(sent, name)
+
+    assert {field: getattr(read, field) for _, field in fields if field != "rel_vel_ekf2_valid"} == {
+        field: value for field, value in values.items() if field != "rel_vel_ekf2_valid"
+    }
