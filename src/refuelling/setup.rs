@@ -47,7 +47,10 @@ pub enum RefuellingSetupError {
     },
     /// Regions that enclose nothing, or a contact window outside the pre-contact region.
     #[error("{place}: {source}")]
-    Envelope { place: Place, source: EnvelopeError },
+    Envelope {
+        place: Place,
+        source: Box<EnvelopeError>,
+    },
 }
 
 /// What is fixed to the two aircraft, and the regions of the approach.
@@ -133,7 +136,7 @@ impl RefuellingSetup {
         )
         .map_err(|error| RefuellingSetupError::Envelope {
             place: Place::at(source, raw.contact.referenced),
-            source: error,
+            source: Box::new(error),
         })?;
         Ok(Self {
             camera_in_receiver: far(&raw.camera_in_receiver, "camera_in_receiver")?,

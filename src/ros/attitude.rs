@@ -32,7 +32,7 @@ pub enum AttitudeMessage {
     /// `px4_msgs/VehicleAttitude`.
     Px4(VehicleAttitude),
     /// `sensor_msgs/Imu`.
-    Imu(Imu),
+    Imu(Box<Imu>),
 }
 
 /// The topic, if there is one.
@@ -77,7 +77,7 @@ impl AttitudeSubscription {
             }
             Self::Imu(subscription) => {
                 let samples = subscription.async_stream();
-                Box::pin(samples.map(|sample| Ok(AttitudeMessage::Imu(sample?.0))))
+                Box::pin(samples.map(|sample| Ok(AttitudeMessage::Imu(Box::new(sample?.0)))))
             }
         }
     }

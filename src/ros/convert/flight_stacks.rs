@@ -116,7 +116,7 @@ pub fn px4_fiducial_marker(
     })
 }
 
-/// Returns MAVROS's landing target of one frame, such that MAVLink's `LANDING_TARGET` has it in BODY_FRD.
+/// Returns MAVROS's landing target of one frame, such that `MAVLink`'s `LANDING_TARGET` has it in `BODY_FRD`.
 ///
 /// MAVROS turns the pose from ENU to NED whatever `frame` says, so FRD is written down as though it were
 /// NED told in ENU.

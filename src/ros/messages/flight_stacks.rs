@@ -9,6 +9,7 @@ use super::{Header, Pose, Quaternion, Vector3};
 
 /// `px4_msgs/LandingTargetPose`; NED about the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "PX4's message has them")]
 pub struct LandingTargetPose {
     /// Of the measurement, PX4's clock, µs.
     pub timestamp: u64,
@@ -91,7 +92,7 @@ pub struct LandingTarget {
     pub header: Header,
     /// Which target.
     pub target_num: u8,
-    /// `MAV_FRAME`, as MAVLink numbers them; the constants in `LandingTarget.msg` are off by one and more.
+    /// `MAV_FRAME`, as `MAVLink` numbers them; the constants in `LandingTarget.msg` are off by one and more.
     pub frame: u8,
     /// Offsets from straight ahead, to the right and downwards, rad.
     pub angle: [f32; 2],
