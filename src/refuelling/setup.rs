@@ -303,11 +303,11 @@ mod tests {
             "pre_contact",
             "contact",
         ] {
-            let without: String = EXAMPLE
+            let kept: Vec<&str> = EXAMPLE
                 .lines()
                 .filter(|line| !line.starts_with(&format!("{key}:")))
-                .map(|line| format!("{line}\n"))
                 .collect();
+            let without = kept.join("\n");
             let error = RefuellingSetup::from_yaml(&without, "s.yaml").expect_err(key);
             assert!(error.to_string().contains(key), "{error}");
         }
