@@ -19,16 +19,14 @@ from harness import messages
 from harness.conftest import StartEstimator, StartNode
 from harness.estimator import Estimator
 from harness.peer import Peer
+from harness.processes import REPOSITORY
 
 NODE = "/tanker_pose"
+# As the file for people marks them.
 FIXED = {
-    "marker_map",
-    "tanker_frame_id",
-    "publish_tf",
-    "publish_markers",
-    "input",
-    "max_hamming",
-    "lifecycle",
+    line.split(":")[0].strip()
+    for line in (REPOSITORY / "config" / "tanker_pose.yaml").read_text(encoding="utf-8").splitlines()
+    if "# (fixed)" in line
 }
 QOS = "qos_overrides./pose.publisher"
 
