@@ -1,10 +1,10 @@
-"""Faults around the node, each provoked and cleared: one log line at either end, `/diagnostics` in between."""
+"""Faults around the node, each provoked and cleared: one log line at either end, `/diagnostics` in between.
 
-import signal
-import sys
-from collections.abc import Callable, Iterator
+`dropped_output` is not among them: the middleware refuses a sample only after 8192 unacknowledged ones.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 from builtin_interfaces.msg import Time
@@ -31,30 +31,16 @@ SIMULATED_S = 1000
 
 RATES = {"frame_rate_hz", "camera_info_rate_hz", "estimate_rate_hz"}
 
-# A subscriber in a process of its own, which can be stopped.
-SUBSCRIBER = """
-import rclpy
-from rclpy.qos import QoSProfile
-from tanker_pose.msg import EstimatorStatus
-rclpy.init()
-node = rclpy.create_node("sleeper", enable_rosout=False)
-node.create_subscription(EstimatorStatus, "/status", lambda message: None, QoSProfile(depth=10))
-rclpy.spin(node)
-"""
-
 
 class Scene:
     """A camera, a detector and a simulator, each of which speaks while it is switched on."""
 
-    def __init__(self, peer: Peer, process: Process, domain: int, directory: Path) -> None:
+    def __init__(self, peer: Peer, process: Process) -> None:
         self.peer = peer
         self.process = process
-        self.domain = domain
-        self.directory = directory
         self.reports: list[DiagnosticArray] = peer.collect(DiagnosticArray, "/diagnostics")
         self.publishers: dict[str, object] = {}
         self.others: list[object] = []
-        self.child: Process | None = None
         self.speaking: set[str] = set()
         self.frame_id = messages.CAMERA_FRAME
         self.index = 0
@@ -221,29 +207,12 @@ def turn_clock(by_s: int) -> Callable[[Scene], None]:
     return provoke
 
 
-def put_subscriber_to_sleep(scene: Scene) -> None:
-    both(scene)
-    command = [sys.executable, "-c", SUBSCRIBER]
-    scene.child = Process(command, scene.domain, scene.directory, {})
-    node = scene.peer.node
-    scene.step_until(lambda: node.count_subscribers("/status") == 1, "the other subscriber")
-    # Its own discovery of the node's publisher.
-    scene.steps_for(2.0)
-    scene.child.send(signal.SIGSTOP)
-
-
-def wake_subscriber(scene: Scene) -> None:
-    assert scene.child is not None
-    scene.child.send(signal.SIGCONT)
-
-
 def nothing(scene: Scene) -> None:
     """What is over by itself."""
 
 
 RELIABLE_INPUT = ("-p", "qos_overrides./feature_points.subscription.reliability:=reliable")
 SIM_TIME = ("-p", "use_sim_time:=true")
-SHALLOW = ("-p", "qos_overrides./status.publisher.history:=keep_all")
 
 CASES = {
     "publisher offers less": Case(
@@ -317,32 +286,17 @@ CASES = {
     "no clock": Case(
         "no_clock", "no /clock has come", nothing, lambda scene: scene.speak("/clock"), SIM_TIME
     ),
-    "subscriber does not keep up": Case(
-        "dropped_output",
-        "/status: a subscriber does not keep up",
-        put_subscriber_to_sleep,
-        wake_subscriber,
-        SHALLOW,
-    ),
 }
 
 
 @pytest.fixture
-def make_scene(
-    start_node: StartNode, peer: Peer, domain: int, tmp_path: Path
-) -> Iterator[Callable[..., Scene]]:
-    scenes: list[Scene] = []
-
+def make_scene(start_node: StartNode, peer: Peer) -> Callable[..., Scene]:
     def make(*arguments: str) -> Scene:
-        scene = Scene(peer, start_node(*arguments), domain, tmp_path / "child")
-        scenes.append(scene)
+        scene = Scene(peer, start_node(*arguments))
         peer.spin_until(lambda: len(scene.reports) > 0, "a first report")
         return scene
 
-    yield make
-    for scene in scenes:
-        if scene.child is not None:
-            scene.child.kill_if_running()
+    return make
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
