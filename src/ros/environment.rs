@@ -2,6 +2,8 @@
 
 use std::net::Ipv4Addr;
 
+use super::distribution;
+
 /// The highest domain whose ports fit below 65536; `RustDDS` wraps silently above it.
 pub const MAX_DOMAIN_ID: u16 = 232;
 
@@ -144,6 +146,9 @@ impl Environment {
                 "ROS_STATIC_PEERS ({peers}) is not supported and has no effect"
             ));
         }
+        if let Some(ros_distro) = get("ROS_DISTRO")? {
+            warnings.extend(distribution::mismatch(&ros_distro));
+        }
         Ok(Self {
             domain_id,
             discovery_range,
@@ -228,6 +233,22 @@ mod tests {
         );
         let off = environment(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")]);
         assert_eq!(off, Err(EnvironmentError::DiscoveryOff));
+    }
+
+    #[test]
+    fn a_distribution_of_the_other_wire_format_is_warned_of() {
+        let other = if cfg!(feature = "humble") {
+            "jazzy"
+        } else {
+            "humble"
+        };
+        let found = environment(&[("ROS_DISTRO", other)]).expect("it goes on with a warning");
+        assert_eq!(
+            found.warnings,
+            [distribution::mismatch(other).expect("other")]
+        );
+        let own = environment(&[("ROS_DISTRO", distribution::built_for())]).expect("its own");
+        assert_eq!(own, Environment::default());
     }
 
     #[test]

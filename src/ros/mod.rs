@@ -1,6 +1,7 @@
 //! The node and its graph: the only floor that knows ros2-client, files, clocks and signals.
 //!
 //! ```text
+//! distribution                       which ROS 2 it talks with
 //! arguments, environment, names      what the command line and the variables ask for, checked
 //! parameter_file, start_values       parameters at the start: defaults, files, arguments
 //! parameters, qos_overrides          parameters while the node runs, behind its services
@@ -24,6 +25,7 @@ pub mod clock;
 pub mod consumers;
 pub mod convert;
 pub mod diagnostics;
+pub mod distribution;
 pub mod environment;
 pub mod estimator;
 pub mod graph;
