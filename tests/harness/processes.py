@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 from harness.waiting import PATIENCE_S, wait_until
@@ -20,6 +21,24 @@ def binary(name: str) -> Path:
     path = (directory / name).resolve()
     assert path.is_file(), f"{path} is not built: run `cargo build --bins` first"
     return path
+
+
+def plain_python() -> str:
+    """The interpreter behind this environment, which knows nothing of ROS."""
+    return str(Path(sys.executable).resolve())
+
+
+def children_of(pid: int) -> set[int]:
+    """Ids of the running processes that a process has started."""
+    found = set()
+    for status in Path("/proc").glob("[0-9]*/status"):
+        try:
+            fields = dict(line.split(":", 1) for line in status.read_text().splitlines())
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(fields["PPid"]) == pid and not fields["State"].strip().startswith("Z"):
+            found.add(int(status.parent.name))
+    return found
 
 
 def example(name: str) -> Path:
@@ -66,6 +85,10 @@ class Process:
     @property
     def running(self) -> bool:
         return self._child.poll() is None
+
+    @property
+    def pid(self) -> int:
+        return self._child.pid
 
     def send(self, signal_number: int) -> None:
         """Sends a signal without waiting for its effect."""
