@@ -261,6 +261,29 @@ fn every_option_of_the_contract_is_taken() {
 }
 
 #[test]
+fn the_cameras_mount_turns_the_nominal_attitude_as_in_the_node() {
+    let mut random = ChaCha8Rng::seed_from_u64(44);
+    let scene = random_refuelling_scene(&mut random, 15.0, 16.0);
+    let line = frame(1, &scene.noisy_observations(0.5, &mut random)).to_string();
+    // Tanker and camera turned alike are where they were; one of them alone is the wrong way round.
+    let together = [
+        "--nominal-yaw-deg",
+        "-170",
+        "--camera-mount-yaw-deg",
+        "-170",
+    ];
+    let apart = ["--camera-mount-yaw-deg", "-170"];
+    let solved = |options: &[&str]| solve(options, vec![line.clone()]).remove(0);
+
+    let (plain, turned) = (solved(&[]), solved(&together));
+
+    assert_eq!(plain["outcome"], "ok");
+    let distance = pose_error(&pose(&plain), &pose(&turned)).norm();
+    assert!(distance < 1e-6, "elsewhere by {distance}");
+    assert_ne!(solved(&apart)["outcome"], "ok");
+}
+
+#[test]
 fn a_wrong_point_is_left_out_and_named() {
     let mut random = ChaCha8Rng::seed_from_u64(43);
     let scene = random_refuelling_scene(&mut random, 15.0, 16.0);

@@ -66,6 +66,30 @@ fn demo_ends_in_good_order_when_interrupted() {
 }
 
 #[test]
+fn a_map_with_fewer_markers_than_the_node_needs_is_refused_at_once() {
+    let path = std::env::temp_dir().join(format!("four_{}.yaml", std::process::id()));
+    let corners = [(0, 0, 0), (4, 0, 0), (0, 3, 0), (0, 0, 2)];
+    let lines: Vec<String> = corners
+        .iter()
+        .zip(1..)
+        .map(|((x, y, z), id)| format!("  - {{id: {id}, x: {x}, y: {y}, z: {z}}}\n"))
+        .collect();
+    std::fs::write(&path, format!("name: four\nmarkers:\n{}", lines.concat()))
+        .expect("the directory for such files exists");
+    let output = tool(4)
+        .arg("demo")
+        .arg("--marker-map")
+        .arg(&path)
+        .output()
+        .expect("the tool was just built");
+    std::fs::remove_file(&path).expect("just written");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("\"four\" has 4 markers"), "{said}");
+    assert!(said.contains("needs 5"), "{said}");
+}
+
+#[test]
 fn demo_does_not_fly_where_a_camera_already_publishes() {
     let mut other = tool(2)
         .args(["simulate", "--loop", "--wait-s", "0", "--json"])

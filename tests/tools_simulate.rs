@@ -242,7 +242,25 @@ fn wrong_options_are_refused_by_name() {
             "at least one frame",
         ),
         (&["simulate", "--ros-args", "-r", "nonsense"], "nonsense"),
+        (
+            &["simulate", "--duration-s", "-1"],
+            "expected a number from 0.001",
+        ),
+        (
+            &["simulate", "--ros-args", "-p", "sigma_px:=1"],
+            "no parameter \"sigma_px\"",
+        ),
+        (
+            &[
+                "simulate",
+                "--ros-args",
+                "--params-file",
+                "/nonexistent.yaml",
+            ],
+            "/nonexistent.yaml",
+        ),
         (&["demo", "--domain-id", "233"], "--domain-id"),
+        (&["demo", "--sigma-px", "-0.5"], "expected a number from 0"),
     ] {
         let output = tool(7)
             .args(arguments)

@@ -88,7 +88,7 @@ fn estimator_settings(parameters: &Parameters) -> EstimatorSettings {
             "none" => Refinement::None,
             _ => Refinement::MaximumLikelihood,
         },
-        nominal_camera_from_tanker: nominal_camera_from_tanker(parameters),
+        nominal_camera_from_tanker: nominal_attitude(parameters),
         min_points: parameters.count("min_points"),
         max_outliers: parameters.count("max_outliers"),
         trust_probability: parameters.double("trust_probability"),
@@ -115,10 +115,19 @@ fn filter_settings(parameters: &Parameters) -> FilterSettings {
 ///
 /// `camera_from_tanker = optical_from_body · receiver_from_camera_bodyᵀ · receiver_from_tanker`:
 /// the angles turn bodies with x forward, y left, z up; the optical frame looks along that x.
-fn nominal_camera_from_tanker(parameters: &Parameters) -> Rotation3<f64> {
-    let receiver_from_tanker = turned(parameters, "nominal");
-    let receiver_from_camera_body = turned(parameters, "camera_mount");
+#[must_use]
+pub fn nominal_camera_from_tanker(
+    receiver_from_tanker: &Rotation3<f64>,
+    receiver_from_camera_body: &Rotation3<f64>,
+) -> Rotation3<f64> {
     optical_from_body() * receiver_from_camera_body.inverse() * receiver_from_tanker
+}
+
+fn nominal_attitude(parameters: &Parameters) -> Rotation3<f64> {
+    nominal_camera_from_tanker(
+        &turned(parameters, "nominal"),
+        &turned(parameters, "camera_mount"),
+    )
 }
 
 /// Returns the rotation that three parameters of this prefix say: Rz(yaw) Ry(pitch) Rx(roll).

@@ -11,7 +11,7 @@ mod parameters;
 mod table;
 mod value;
 
-pub use configuration::{Configuration, Input};
+pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
 pub use consumers::{AttitudeSource, ConsumerConfiguration, MissingForOutput};
 pub use parameters::Parameters;
 pub use table::{Kind, ParameterSpec, TABLE};

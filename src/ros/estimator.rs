@@ -380,7 +380,8 @@ impl Estimator {
         self.slowest = self.slowest.max(solve_time);
         if outcome == OutcomeCode::Ok {
             if let Some(count) = self.refusals.good() {
-                log::info!("estimates resume after {count} refused frames");
+                let frames = if count == 1 { "frame" } else { "frames" };
+                log::info!("estimates resume after {count} refused {frames}");
             }
             return;
         }

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use nalgebra::Rotation3;
+use tanker_pose::config::nominal_camera_from_tanker;
 use tanker_pose::estimation::{EstimatorSettings, Initialisation, Refinement};
-use tanker_pose::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
+use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
 use tanker_pose::target::MarkerMap;
 
 /// How a pose is found and judged; the same words as the node's parameters.
@@ -18,7 +20,7 @@ pub struct EstimatorOptions {
     #[arg(long, value_enum, default_value_t = Estimate::MaximumLikelihood)]
     refinement: Estimate,
     /// Standard deviation of pixels that bring none, px
-    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 1e3))]
+    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 100.0))]
     pub pixel_sigma_px: f64,
     /// Fewer points than this give no pose
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(3..))]
@@ -32,33 +34,24 @@ pub struct EstimatorOptions {
     /// Refuse a frame when a second pose is at least this likely; 1: never
     #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = between(0.0, 1.0))]
     max_ambiguity: f64,
-    /// Roll of the tanker relative to the camera's airframe in the nominal attitude, degrees
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true,
-        value_parser = between(-180.0, 180.0)
-    )]
+    /// Roll of the tanker relative to the receiver in the nominal attitude, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
     nominal_roll_deg: f64,
     /// Pitch, degrees
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true,
-        value_parser = between(-180.0, 180.0)
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
     nominal_pitch_deg: f64,
     /// Yaw, degrees
-    #[arg(
-        long,
-        value_name = "DEG",
-        default_value_t = 0.0,
-        allow_negative_numbers = true,
-        value_parser = between(-180.0, 180.0)
-    )]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
     nominal_yaw_deg: f64,
+    /// Roll of the camera in the receiver, degrees; all zero: it looks straight ahead, upright
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    camera_mount_roll_deg: f64,
+    /// Pitch, degrees; positive looks down
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    camera_mount_pitch_deg: f64,
+    /// Yaw, degrees; positive looks left
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    camera_mount_yaw_deg: f64,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -97,18 +90,32 @@ impl EstimatorOptions {
                 Estimate::MaximumLikelihood => Refinement::MaximumLikelihood,
                 Estimate::None => Refinement::None,
             },
-            nominal_camera_from_tanker: optical_from_body()
-                * rotation_from_roll_pitch_yaw(
-                    self.nominal_roll_deg.to_radians(),
-                    self.nominal_pitch_deg.to_radians(),
-                    self.nominal_yaw_deg.to_radians(),
+            nominal_camera_from_tanker: nominal_camera_from_tanker(
+                &turned(
+                    self.nominal_roll_deg,
+                    self.nominal_pitch_deg,
+                    self.nominal_yaw_deg,
                 ),
+                &turned(
+                    self.camera_mount_roll_deg,
+                    self.camera_mount_pitch_deg,
+                    self.camera_mount_yaw_deg,
+                ),
+            ),
             min_points: usize::from(self.min_points),
             max_outliers: usize::from(self.max_outliers),
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
         }
     }
+}
+
+fn turned(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> Rotation3<f64> {
+    rotation_from_roll_pitch_yaw(
+        roll_deg.to_radians(),
+        pitch_deg.to_radians(),
+        yaw_deg.to_radians(),
+    )
 }
 
 /// Returns the marker map that an option names: a shipped one, or a file.

@@ -2,6 +2,11 @@
 
 use clap::Args;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments};
+use tanker_pose::ros::names::NodeNames;
+use tanker_pose::ros::parameter_file::{self, ParameterFileError};
+
+/// Launch files set it for every node; a tool that takes no time from `/clock` need not mind.
+const SIM_TIME: &str = "use_sim_time";
 
 /// `--ros-args`, as every ROS program takes them.
 #[derive(Debug, Clone, Args)]
@@ -27,4 +32,48 @@ impl RosOptions {
         all.extend(self.ros_args.iter().cloned());
         Ok(Arguments::split(&all)?.0)
     }
+}
+
+/// Why the parameters given to a tool that has none cannot be meant.
+#[derive(Debug, thiserror::Error)]
+pub enum NoParametersError {
+    #[error(
+        "argument -p: {node} has no parameter {name:?}; what it does is set by its options, see --help"
+    )]
+    InArgument { node: String, name: String },
+    #[error(transparent)]
+    File(#[from] ParameterFileError),
+}
+
+/// Checks parameters given to a tool that has none; returns warnings.
+///
+/// Files often serve several nodes, by patterns that hold for all of them, so what stands in one is only warned of.
+///
+/// # Errors
+/// [`NoParametersError`] when `-p` sets one, or a file cannot be read.
+pub fn check_no_parameters(
+    arguments: &Arguments,
+    names: &NodeNames,
+) -> Result<Vec<String>, NoParametersError> {
+    let node = names.fully_qualified();
+    for given in &arguments.parameters {
+        let is_ours = given.applies_to_node(names.base_name()) || given.applies_to_node(&node);
+        if is_ours && given.name != SIM_TIME {
+            let name = given.name.clone();
+            return Err(NoParametersError::InArgument { node, name });
+        }
+    }
+    let mut warnings = Vec::new();
+    for path in &arguments.parameter_files {
+        let section = parameter_file::read(path, &node)?.unwrap_or_default();
+        if let Some(first) = section.iter().find(|parameter| parameter.name != SIM_TIME) {
+            warnings.push(format!(
+                "parameter file {}, line {}: {node} has no parameters, {:?} has no effect here",
+                path.display(),
+                first.line,
+                first.name
+            ));
+        }
+    }
+    Ok(warnings)
 }

@@ -59,8 +59,8 @@ pub struct Verdict {
 }
 
 impl Frame {
-    /// Distance ahead, m.
-    pub fn range_m(&self) -> f64 {
+    /// True distance along the camera's axis, m.
+    pub fn ahead_m(&self) -> f64 {
         self.truth_camera_from_tanker.translation.z
     }
 

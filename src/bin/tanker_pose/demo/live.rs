@@ -14,7 +14,7 @@ use crate::simulate::ApproachOptions;
 use crate::terminal::{progress_bar, say};
 
 const HEADER: &str = "
-  time    range  found (m)              error and 1 sigma (cm)               attitude     NEES  latency
+  time    ahead  found (m)              error and 1 sigma (cm)               attitude     NEES  latency
    (s)      (m)   right   down  ahead   right       down        ahead        error (deg)   (6)  p50 (ms)";
 
 /// A line about once a second of flight, and whatever happens in between.
@@ -72,7 +72,7 @@ impl Live {
     /// Takes note of a frame that was sent.
     pub fn sent(&self, frame: &Frame) {
         self.bar
-            .set_message(format!("{:.1} m ahead", frame.range_m()));
+            .set_message(format!("{:.1} m ahead", frame.ahead_m()));
     }
 
     /// Says that the schedule was moved.
@@ -153,7 +153,7 @@ fn line(frame: &Frame, estimate: &Estimate, ledger: &Ledger) -> String {
     format!(
         "{:6.1}  {:7.2} {:7.2}{:7.2}{:7.2}  {}{}{} {turn_deg:6.2} ±{:.2}  {:7.1}  {:8.2}",
         frame.time_s,
-        frame.range_m(),
+        frame.ahead_m(),
         found.x,
         found.y,
         found.z,

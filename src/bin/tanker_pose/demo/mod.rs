@@ -13,6 +13,7 @@ mod summary;
 use std::time::Duration;
 
 use async_signal::{Signal, Signals};
+use tanker_pose::config::{Configuration, Parameters};
 use tanker_pose::pipeline::OutcomeCode;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments as RosArguments};
 use tanker_pose::ros::environment::EnvironmentError;
@@ -20,6 +21,7 @@ use tanker_pose::ros::logging;
 use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::{NODE_NAME, NodeError};
 use tanker_pose::ros::participant::{EndpointError, OpenError};
+use tanker_pose::target::MarkerMap;
 
 use crate::options::between;
 use crate::simulate::source::SourceError;
@@ -37,6 +39,7 @@ use summary::Summary;
 /// In the middle, faults are injected on purpose. Positions and errors stand along the camera's axes: right, down,
 /// ahead. The exit code is 0 when every frame got an outcome: an estimate, or a refusal with its reason.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 pub struct Arguments {
     /// DDS domain; when missing, that of `ROS_DOMAIN_ID`, or one from 50 to 99 that is free on this host
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
@@ -62,6 +65,15 @@ pub struct Arguments {
 pub enum DemoError {
     #[error(transparent)]
     Approach(#[from] ApproachError),
+    #[error(
+        "marker map {map:?} has {got} markers, and the node needs {need} for a pose: \
+         a demo with fewer would show refusals only (see min_points in config/tanker_pose.yaml)"
+    )]
+    TooFewMarkers {
+        map: String,
+        got: usize,
+        need: usize,
+    },
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     #[error(transparent)]
@@ -100,6 +112,7 @@ pub enum DemoError {
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (approach, camera_info) = arguments.approach.read()?;
     let map = arguments.approach.map()?;
+    check_marker_count(&map)?;
     let environment = domain::environment(arguments.domain_id)?;
     let ros_arguments = node_arguments(&arguments.approach.marker_map)?;
     // From here on a signal is kept until it is read, and ends both nodes in good order.
@@ -132,6 +145,20 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
         flown => flown,
     }?;
     report(flight.ledger(), end, arguments.json)
+}
+
+/// The node runs with its defaults.
+fn check_marker_count(map: &MarkerMap) -> Result<(), DemoError> {
+    let need = Configuration::from(&Parameters::default())
+        .settings
+        .estimator
+        .min_points;
+    let got = map.markers().len();
+    if got < need {
+        let map = map.name().to_owned();
+        return Err(DemoError::TooFewMarkers { map, got, need });
+    }
+    Ok(())
 }
 
 fn report(ledger: &Ledger, end: End, json: bool) -> Result<(), DemoError> {

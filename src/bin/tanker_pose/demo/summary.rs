@@ -48,8 +48,8 @@ struct Injected {
 #[derive(Debug, Serialize)]
 struct Bin {
     part: &'static str,
-    from_range_m: f64,
-    to_range_m: f64,
+    from_ahead_m: f64,
+    to_ahead_m: f64,
     estimates: usize,
     /// Right, down, ahead.
     position_rmse_m: [Option<f64>; 3],
@@ -149,23 +149,23 @@ fn injected(ledger: &Ledger) -> Injected {
 
 /// Three parts of equal length between the farthest and the nearest frame.
 fn accuracy(ledger: &Ledger) -> Vec<Bin> {
-    let ranges = || ledger.frames().map(Frame::range_m);
-    let far = ranges().fold(f64::MIN, f64::max);
-    let step = (far - ranges().fold(f64::MAX, f64::min)) / BINS.len() as f64;
+    let distances = || ledger.frames().map(Frame::ahead_m);
+    let far = distances().fold(f64::MIN, f64::max);
+    let step = (far - distances().fold(f64::MAX, f64::min)) / BINS.len() as f64;
     let bin = |(k, part): (usize, &'static str)| {
-        let from_range_m = far - step * k as f64;
-        let to_range_m = from_range_m - step;
+        let from_ahead_m = far - step * k as f64;
+        let to_ahead_m = from_ahead_m - step;
         let is_last = k + 1 == BINS.len();
         let errors: Vec<_> = ledger
             .frames()
-            .filter(|frame| frame.range_m() <= from_range_m)
-            .filter(|frame| frame.range_m() > to_range_m || is_last)
+            .filter(|frame| frame.ahead_m() <= from_ahead_m)
+            .filter(|frame| frame.ahead_m() > to_ahead_m || is_last)
             .filter_map(|frame| Some(frame.trusted()?.error))
             .collect();
         Bin {
             part,
-            from_range_m,
-            to_range_m,
+            from_ahead_m,
+            to_ahead_m,
             estimates: errors.len(),
             position_rmse_m: std::array::from_fn(|axis| rms(errors.iter().map(|e| e[axis]))),
             attitude_rmse_deg: rms(errors.iter().map(|e| e.fixed_rows::<3>(3).norm()))
@@ -234,7 +234,7 @@ impl Display for Summary {
                 out,
                 "    {:<7}{:<9} {:6.2} cm {:6.2} cm {:6.2} cm  {:6.3} deg  {:6}",
                 bin.part,
-                format!("{:.0}-{:.0} m", bin.from_range_m, bin.to_range_m),
+                format!("{:.0}-{:.0} m", bin.from_ahead_m, bin.to_ahead_m),
                 cm(0),
                 cm(1),
                 cm(2),

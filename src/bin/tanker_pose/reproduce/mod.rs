@@ -22,6 +22,7 @@ use monte_carlo::Outcome;
 const RUN_IMAGES_A_SECOND: f64 = 2.0;
 
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 pub struct Arguments {
     /// What to reproduce
     #[arg(value_enum, default_value_t = What::All)]

@@ -14,13 +14,13 @@ use futures::future::{Either, select};
 use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::environment::{Environment, EnvironmentError};
 use tanker_pose::ros::logging;
-use tanker_pose::ros::names::NamesError;
+use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
 use tanker_pose::simulation::Approach;
 
 use crate::options::between;
-use crate::ros_options::RosOptions;
+use crate::ros_options::{NoParametersError, RosOptions, check_no_parameters};
 pub use approach_options::{ApproachError, ApproachOptions};
 use fault::gross_error;
 pub use pace::Pace;
@@ -37,6 +37,7 @@ const LINGER: Duration = Duration::from_millis(200);
 /// Topics: `feature_points`, `camera_info` just before each, and the true pose as `geometry_msgs/PoseStamped` on
 /// `truth`. They are stamped with the time of publication. The same options give the same pixels every time.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 pub struct Arguments {
     /// Start again at the first frame after the last, until a signal
     #[arg(long = "loop")]
@@ -71,6 +72,8 @@ pub enum SimulateError {
     #[error(transparent)]
     Argument(#[from] ArgumentError),
     #[error(transparent)]
+    Parameter(#[from] NoParametersError),
+    #[error(transparent)]
     Environment(#[from] EnvironmentError),
     #[error(transparent)]
     Names(#[from] NamesError),
@@ -88,12 +91,14 @@ pub enum SimulateError {
 pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
     let ros_arguments = arguments.ros.read()?;
     let environment = Environment::from_process()?;
+    let names = NodeNames::new(NODE_NAME, &ros_arguments.remaps)?;
+    let warnings = check_no_parameters(&ros_arguments, &names)?;
     let (approach, camera_info) = arguments.approach.read()?;
     // From here on a signal is kept until it is read, and ends the node in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(SimulateError::Signals)?;
     let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, NodeOptions::new())?;
     logging::start(&ros_arguments, ros.names());
-    for warning in &environment.warnings {
+    for warning in environment.warnings.iter().chain(&warnings) {
         log::warn!("{warning}");
     }
     let length = (!arguments.repeat).then(|| approach.frame_count());

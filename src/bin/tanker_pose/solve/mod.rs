@@ -24,6 +24,7 @@ use crate::options::{self, EstimatorOptions};
 const MAX_COORDINATE_M: f64 = 1e3;
 
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 pub struct Arguments {
     /// JSON Lines to read; standard input when missing or -
     file: Option<PathBuf>,

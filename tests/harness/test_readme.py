@@ -1,0 +1,37 @@
+"""The README's program does what it says: extracted, run, heard, and ended by Ctrl-C."""
+
+import re
+import sys
+from pathlib import Path
+
+from harness import messages
+from harness.conftest import StartEstimator
+from harness.estimator import Estimator
+from harness.peer import RELIABLE
+from harness.processes import REPOSITORY, Process
+from harness.waiting import wait_until
+
+
+def test_the_python_subscriber_logs_the_pose_and_ends_quietly_on_ctrl_c(
+    start_estimator: StartEstimator, domain: int, tmp_path: Path
+) -> None:
+    readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
+    script = tmp_path / "follower.py"
+    script.write_text(program, encoding="utf-8")
+    estimator: Estimator = start_estimator(qos=RELIABLE)
+    estimator.use_camera()
+
+    follower = Process([sys.executable, str(script)], domain, tmp_path / "follower", {})
+    try:
+        wait_until(
+            lambda: re.search(r"\d m ahead, sigma \d", follower.log),
+            "the subscriber to log a pose",
+            pause=lambda: estimator.expect_pose(messages.exact_frame(estimator.next_index())),
+        )
+        estimator.peer.spin_for(0.5)  # what is under way has arrived
+        follower.stop()
+    finally:
+        follower.kill_if_running()
+
+    assert "Traceback" not in follower.log, follower.log
