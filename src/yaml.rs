@@ -7,8 +7,10 @@
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use serde_saphyr::{DefaultMessageFormatter, Location, MessageFormatter as _, Options};
+use serde_saphyr::{DefaultMessageFormatter, Error, Location, MessageFormatter as _, Options};
 use serde_saphyr::{DuplicateKeyPolicy, MergeKeyPolicy};
+
+use crate::text::clip;
 
 /// A place that an error can point to: `config/tankers/paper.yaml:7:9`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,12 +76,78 @@ pub struct YamlError {
 /// [`YamlError`] with the place in `source`: syntax, a wrong type, a missing, unknown or repeated key.
 pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlError> {
     serde_saphyr::from_str_with_options(text, strict()).map_err(|error| {
-        let message = DefaultMessageFormatter.format_message(&error).into_owned();
+        let location = error.location().unwrap_or(Location::UNKNOWN);
+        let message = plainly(&error, text, location);
         YamlError {
-            place: Place::at(source, error.location().unwrap_or(Location::UNKNOWN)),
+            place: Place::at(source, location),
             reason: message.replace(char::is_control, " "),
         }
     })
+}
+
+/// Returns the fault in words for who writes such files; the reader's own words name Rust's types.
+fn plainly(error: &Error, text: &str, location: Location) -> String {
+    let got = || match word_at(text, location) {
+        "" => "nothing".to_owned(),
+        word => format!("{:?}", clip(word)),
+    };
+    match error.without_snippet() {
+        Error::InvalidScalar { ty, .. } => format!("expected {}, got {}", in_words(ty), got()),
+        Error::Unexpected { expected, .. } => {
+            format!("expected {}, got {}", in_words(expected), got())
+        }
+        Error::NullIntoString { .. } => "expected text, got nothing".to_owned(),
+        Error::SerdeMissingField { field, .. } => format!("{field} is missing here"),
+        Error::SerdeUnknownField {
+            field, expected, ..
+        } => format!(
+            "unknown key {:?}, expected {}",
+            clip(field),
+            expected.join(", ")
+        ),
+        Error::DuplicateMappingKey { key, .. } => {
+            format!(
+                "duplicate key {:?}",
+                clip(key.as_deref().unwrap_or_default())
+            )
+        }
+        other => DefaultMessageFormatter.format_message(other).into_owned(),
+    }
+}
+
+/// What YAML and Rust call a thing, as people do.
+fn in_words(kind: &str) -> &str {
+    match kind {
+        "i8" | "i16" | "i32" | "i64" | "u8" | "u16" | "u32" | "u64" => "a whole number",
+        "f32" | "f64" | "floating point" => "a number",
+        "sequence start" => "a list",
+        "mapping start" => "keys with values",
+        "string scalar" => "a single value",
+        other => other,
+    }
+}
+
+/// Returns the value that begins at a place, up to the end of its line at most.
+fn word_at(text: &str, location: Location) -> &str {
+    let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
+    let line = text
+        .lines()
+        .nth(index(location.line()).wrapping_sub(1))
+        .unwrap_or_default();
+    let begin = line
+        .char_indices()
+        .nth(index(location.column()).wrapping_sub(1));
+    let rest = begin.map_or("", |(begin, _)| &line[begin..]);
+    // Of a key without a value the place is that of its colon.
+    let rest = rest.strip_prefix(':').unwrap_or(rest);
+    let rest = rest.split(" #").next().unwrap_or_default().trim_start();
+    // Lists and maps in brackets are shown whole, single values without what closes the one around them.
+    let end = if rest.starts_with(['[', '{']) {
+        rest.len()
+    } else {
+        rest.find([',', ']', '}']).unwrap_or(rest.len())
+    };
+    rest[..end].trim()
 }
 
 /// Options under which nothing is accepted that a reader of the file would not expect.
@@ -141,6 +209,33 @@ mod tests {
                 "{error}"
             );
             assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    }
+
+    #[test]
+    fn slips_are_told_in_plain_words_with_what_came() {
+        let slips = [
+            (
+                "a: 1\nb: 2.5 # two\n",
+                "s.yaml:2:4: expected a whole number, got \"2.5\"",
+            ),
+            (
+                "{a: one, b: 2}\n",
+                "s.yaml:1:5: expected a number, got \"one\"",
+            ),
+            ("a:\nb: 2\n", "expected a number, got nothing"),
+            (
+                "a: [1, 2]\nb: 2\n",
+                "expected a single value, got \"[1, 2]\"",
+            ),
+            ("a: 1\n", "b is missing here"),
+            ("a: 1\nb: 2\nc: 3\n", "unknown key \"c\", expected a, b"),
+            ("a: 1\nb: 2\na: 3\n", "duplicate key \"a\""),
+            ("[1, 2]\n", "expected keys with values, got \"[1, 2]\""),
+        ];
+        for (text, words) in slips {
+            let error = refusal(text).to_string();
+            assert!(error.ends_with(words), "{text:?} gave {error}");
         }
     }
 
