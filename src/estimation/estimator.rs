@@ -140,34 +140,6 @@ impl Estimator {
         }
     }
 
-    /// Returns the two poses of an image that a solution without exclusions has found ambiguous: its own and
-    /// its rival's, each judged against the other; none when there is no second one.
-    pub(crate) fn both_poses(
-        &self,
-        camera: &Camera,
-        observations: &[Observation],
-        ambiguous: &Solution,
-    ) -> Option<[Solution; 2]> {
-        let mut room = Room::new();
-        let refinement = self.settings.refinement;
-        let problem = Problem::new(camera, refinement, observations, &mut room).ok()?;
-        let rotation = ambiguous.camera_from_tanker.rotation.to_rotation_matrix();
-        let own = problem
-            .fit(&problem.descend(&rotation).ok()?.rotation)
-            .ok()?;
-        let rival = ambiguity::rival(&problem, &own)?;
-        let judged = |fit: &Fit, other: &Fit| {
-            let judged = Judged {
-                fit,
-                ambiguity: likelihood_ratio(other.chi_squared, fit.chi_squared),
-                iterations: ambiguous.iterations,
-                initialisation: ambiguous.initialisation,
-            };
-            self.judge(&problem, &judged)
-        };
-        Some([judged(&own, &rival), judged(&rival, &own)])
-    }
-
     /// Returns what the prior holds against a hypothesis about wrong points; infinite beyond
     /// [`MAX_TURN_FROM_PRIOR`], nothing for starts that have no prior.
     fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {

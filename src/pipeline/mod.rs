@@ -19,7 +19,7 @@ use nalgebra::Rotation3;
 
 use crate::camera::{Camera, CameraError, CameraInfo};
 use crate::config::Settings;
-use crate::estimation::{EstimateError, Estimator, EstimatorSettings, Initialisation, Observation};
+use crate::estimation::{EstimateError, Estimator, Initialisation, Observation};
 use crate::target::MarkerMap;
 
 pub use checks::observe;
@@ -177,9 +177,7 @@ impl Pipeline {
         let mut outcome = match self.observations(frame) {
             Ok((camera, observations)) => {
                 let previous = self.expected_rotation(frame.stamp);
-                let outcome = solve(&self.estimator, camera, &observations, previous.as_ref());
-                self.resolved(frame.stamp, camera, &observations, &outcome)
-                    .unwrap_or(outcome)
+                solve(&self.estimator, camera, &observations, previous.as_ref())
             }
             Err(refusal) => FrameOutcome::refused(refusal),
         };
@@ -211,38 +209,6 @@ impl Pipeline {
                 .map(|(rotation, _)| rotation)
         };
         self.tracker.expected_rotation(stamp).or_else(last)
-    }
-
-    /// Returns the outcome of a frame refused as ambiguous when the track contradicts exactly one of its two
-    /// poses: the other one, with the ambiguity that the image gives it.
-    ///
-    /// With [`Initialisation::Previous`] only: who starts elsewhere wants frames that stand alone.
-    fn resolved(
-        &self,
-        stamp: Stamp,
-        camera: &Camera,
-        observations: &[Observation],
-        refused: &FrameOutcome,
-    ) -> Option<FrameOutcome> {
-        let settings = self.estimator.settings();
-        let doubtful = refused.doubtful.as_ref()?;
-        if settings.initialisation != Initialisation::Previous
-            || !matches!(refused.result, Err(Refusal::Ambiguous { .. }))
-            || doubtful.excluded.ids().next().is_some()
-        {
-            return None;
-        }
-        let both = self.estimator.both_poses(camera, observations, doubtful)?;
-        let choice = self.tracker.choice(stamp, &both)?;
-        let [first, second] = both;
-        let chosen = if choice == 0 { first } else { second };
-        let whatever_the_ambiguity = EstimatorSettings {
-            max_ambiguity: 1.0,
-            ..settings.clone()
-        };
-        let mut outcome = FrameOutcome::judged(chosen, observations, &whatever_the_ambiguity);
-        outcome.track.has_chosen = true;
-        outcome.result.is_ok().then_some(outcome)
     }
 
     /// Returns the camera of a frame with this header.

@@ -7,7 +7,6 @@
 use nalgebra::Rotation3;
 
 use super::{FrameOutcome, OutcomeCode, Stamp};
-use crate::estimation::Solution;
 use crate::geometry::Motion;
 use crate::tracking::{Filter, FilterSettings, TrackOutcome};
 
@@ -20,8 +19,6 @@ pub struct FrameTrack {
     /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; none
     /// without a confirmed track, or when the frame came late.
     pub motion: Option<Motion>,
-    /// The frame's pose is one of two that fit the image alike, and the track has chosen it.
-    pub has_chosen: bool,
 }
 
 impl FrameTrack {
@@ -34,7 +31,6 @@ impl FrameTrack {
             }
             Some(TrackOutcome::Gated { .. }) => TrackCode::Gated,
             Some(TrackOutcome::Updated { .. } | TrackOutcome::Acquired) => TrackCode::Updated,
-            Some(_) if self.motion.is_some() && self.has_chosen => TrackCode::Resolved,
             Some(_) if self.motion.is_some() => TrackCode::Predicted,
             Some(
                 TrackOutcome::Started(_)
@@ -57,19 +53,17 @@ pub enum TrackCode {
     Predicted = 3,
     Gated = 4,
     OutOfOrder = 5,
-    Resolved = 6,
 }
 
 impl TrackCode {
     /// Every code, in the order of its number.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 6] = [
         Self::None,
         Self::Candidate,
         Self::Updated,
         Self::Predicted,
         Self::Gated,
         Self::OutOfOrder,
-        Self::Resolved,
     ];
 
     /// Returns the number on the wire.
@@ -88,7 +82,6 @@ impl TrackCode {
             Self::Predicted => "PREDICTED",
             Self::Gated => "GATED",
             Self::OutOfOrder => "OUT_OF_ORDER",
-            Self::Resolved => "RESOLVED",
         }
     }
 }
@@ -126,23 +119,6 @@ impl Tracker {
         Some(motion.b_from_a.rotation.to_rotation_matrix())
     }
 
-    /// Returns which of two poses of one image is the tanker's: the one within the gate, when the other is not.
-    ///
-    /// None without a confirmed track, and when the track contradicts both or neither.
-    pub(super) fn choice(&self, stamp: Stamp, both: &[Solution; 2]) -> Option<usize> {
-        let filter = self.0.as_ref()?;
-        let agrees = |solution: &Solution| {
-            let (pose, covariance) = (&solution.camera_from_tanker, &solution.covariance);
-            let squared = filter.innovation_squared(stamp.nanoseconds(), pose, covariance);
-            squared.ok().map(|squared| squared <= filter.gate_limit())
-        };
-        match (agrees(&both[0])?, agrees(&both[1])?) {
-            (true, false) => Some(0),
-            (false, true) => Some(1),
-            _ => None,
-        }
-    }
-
     /// Tells the filter of a frame, and enters what came of it in the outcome.
     pub(super) fn follow(&mut self, stamp: Stamp, frame: &mut FrameOutcome) {
         let Some(filter) = &mut self.0 else {
@@ -161,7 +137,7 @@ impl Tracker {
         let stamp_ns = stamp.nanoseconds();
         let outcome = match &frame.result {
             // Chosen by the track, it would only tell the track what that already believes.
-            Ok(solution) if !frame.track.has_chosen => {
+            Ok(solution) => {
                 filter.update(stamp_ns, &solution.camera_from_tanker, &solution.covariance)
             }
             _ => filter.miss(stamp_ns),

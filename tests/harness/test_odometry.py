@@ -30,7 +30,7 @@ TRACKS: dict[int, str] = {
     for name, value in type(EstimatorStatus).__prepare__("EstimatorStatus", ()).items()
     if name.startswith("TRACK_")
 }
-WITH_ODOMETRY = {"UPDATED", "PREDICTED", "GATED", "RESOLVED"}
+WITH_ODOMETRY = {"UPDATED", "PREDICTED", "GATED"}
 
 
 def flight(time_s: float) -> Pose:
