@@ -85,7 +85,8 @@ impl PoseCovariance {
         for row in 0..3 {
             for column in 0..3 {
                 covariance[(row, column)] = position[(row.min(column), row.max(column))];
-                covariance[(3 + row, 3 + column)] = turn[(row, column)];
+                // One triangle for both: what comes in may be symmetric but for rounding.
+                covariance[(3 + row, 3 + column)] = turn[(row.min(column), row.max(column))];
                 covariance[(row, 3 + column)] = mixed[(row, column)];
                 covariance[(3 + column, row)] = mixed[(row, column)];
             }

@@ -136,7 +136,6 @@ impl Tracker {
         }
         let stamp_ns = stamp.nanoseconds();
         let outcome = match &frame.result {
-            // Chosen by the track, it would only tell the track what that already believes.
             Ok(solution) => {
                 filter.update(stamp_ns, &solution.camera_from_tanker, &solution.covariance)
             }

@@ -311,6 +311,6 @@ mod tests {
             let error = RefuellingSetup::from_yaml(&without, "s.yaml").expect_err(key);
             assert!(error.to_string().contains(key), "{error}");
         }
-        assert!(changed("x: 5.0, ", "").contains("missing field"));
+        assert!(changed("x: 5.0, ", "").contains("x is missing here"));
     }
 }
