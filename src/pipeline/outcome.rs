@@ -288,17 +288,18 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
             reason: "from this view they leave a direction of the pose free",
         });
     }
-    let sigma_deg = solution.covariance.largest_attitude_sigma().to_degrees();
-    if sigma_deg > MAX_ATTITUDE_SIGMA_DEG {
-        return Some(Refusal::TooUncertain {
-            sigma_deg,
-            limit_deg: MAX_ATTITUDE_SIGMA_DEG,
-        });
-    }
+    // Before the uncertainty, which is what a second pose next to the first makes of the covariance.
     let limit = settings.max_ambiguity;
     let has_rival = solution.ambiguity > 0.0 && solution.ambiguity >= limit;
-    (has_rival && limit < 1.0).then_some(Refusal::Ambiguous {
-        ambiguity: solution.ambiguity,
-        limit: settings.max_ambiguity,
+    if has_rival && limit < 1.0 {
+        return Some(Refusal::Ambiguous {
+            ambiguity: solution.ambiguity,
+            limit: settings.max_ambiguity,
+        });
+    }
+    let sigma_deg = solution.covariance.largest_attitude_sigma().to_degrees();
+    (sigma_deg > MAX_ATTITUDE_SIGMA_DEG).then_some(Refusal::TooUncertain {
+        sigma_deg,
+        limit_deg: MAX_ATTITUDE_SIGMA_DEG,
     })
 }
