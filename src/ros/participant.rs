@@ -32,6 +32,12 @@ use super::messages::Message;
 use super::names::{NamesError, NodeNames};
 use super::qos_overrides::{QosOverrides, Role};
 
+/// How long the participants of a host get to find each other before the first endpoint is announced.
+///
+/// RustDDS announces endpoints without a source timestamp. Fast DDS orders what it cannot deliver yet by that
+/// stamp, and loses announcements for good when two such participants have some that it must ask for again. It
+/// asks for none that come after it has found their participant, or all at once from one that was there before.
+const ACQUAINTANCE: Duration = Duration::from_millis(150);
 /// How long the background task may take to end before it is left behind.
 const SPIN_GRACE: Duration = Duration::from_millis(300);
 
@@ -151,6 +157,7 @@ impl RosNode {
             source: error.into(),
         })?;
         let farewell = Farewell::new(participant.guid().to_bytes(), environment);
+        std::thread::sleep(ACQUAINTANCE);
         let context = Context::from_domain_participant(participant)?;
         let options = options.enable_rosout(arguments.rosout_logs);
         let mut node = context.new_node(names.client_node()?, options)?;

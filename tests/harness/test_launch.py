@@ -64,11 +64,9 @@ def publishers(peer: Peer, node: str, namespace: str = "/") -> dict[str, str]:
 
 
 def wait_for_publishers(peer: Peer, topics: set[str], node: str, namespace: str = "/") -> None:
-    # Three programs start at once, and one lost announcement is repeated only after some seconds.
     peer.spin_until(
         lambda: topics <= publishers(peer, node, namespace).keys(),
         f"{topics} of {namespace} {node}",
-        timeout_s=60.0,
     )
 
 
