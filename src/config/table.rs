@@ -365,7 +365,7 @@ pub const TABLE: &[ParameterSpec] = &[
     ParameterSpec {
         name: "acceleration_density_mps2",
         kind: Kind::Double {
-            default: 0.2,
+            default: 0.15,
             min: 1e-4,
             max: 1e3,
         },

@@ -15,10 +15,8 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory, totals};
 use super::points::{Block, Points};
+use super::symmetric3::{Symmetric3, inverse};
 use crate::camera::Ray;
-
-/// A symmetric 3×3 matrix by its upper triangle: 11, 12, 13, 22, 23, 33.
-pub(crate) type Symmetric3<T = f64> = [T; 6];
 
 /// Where entry `(a, b)` of a symmetric matrix stands in [`Symmetric3`].
 const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
@@ -391,29 +389,6 @@ fn entries(rotation: &Rotation3<f64>) -> [f64; 9] {
     [
         m.m11, m.m21, m.m31, m.m12, m.m22, m.m32, m.m13, m.m23, m.m33,
     ]
-}
-
-/// Returns the inverse of a symmetric matrix; none for a singular one.
-#[inline(always)]
-fn inverse(s: &Symmetric3) -> Option<Symmetric3> {
-    let [m11, m12, m13, m22, m23, m33] = *s;
-    let (c11, c12, c13) = (
-        m22 * m33 - m23 * m23,
-        m13 * m23 - m12 * m33,
-        m12 * m23 - m13 * m22,
-    );
-    let determinant = m11 * c11 + m12 * c12 + m13 * c13;
-    let share = 1.0 / determinant;
-    let inverse = [
-        c11,
-        c12,
-        c13,
-        m11 * m33 - m13 * m13,
-        m12 * m13 - m11 * m23,
-        m11 * m22 - m12 * m12,
-    ]
-    .map(|cofactor| cofactor * share);
-    (determinant != 0.0).then_some(inverse)
 }
 
 #[cfg(test)]

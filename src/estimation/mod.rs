@@ -22,6 +22,7 @@ mod covariance;
 mod estimator;
 mod exclude;
 mod four;
+mod information;
 mod initialise;
 mod newton;
 mod orthogonal_iteration;
@@ -29,7 +30,7 @@ mod points;
 mod problem;
 mod refine;
 mod residuals;
-pub(crate) mod symmetric6;
+mod symmetric3;
 mod trust;
 mod widen;
 

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::collinearity::CollinearityCost;
 use super::four::{Arithmetic, Kernel, vectorised};
+use super::symmetric3::{positive_inverse, times};
 use crate::geometry::{axial, cayley};
 
 /// Where a descent ended.
@@ -170,23 +171,12 @@ fn newton_step<A: Arithmetic>(
     }
 }
 
-/// Returns `H⁻¹ g` by `L D Lᵀ`; none unless the matrix is positive definite.
+/// Returns `H⁻¹ g`; none unless the matrix is positive definite.
 #[inline(always)]
 fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let d1 = h.m11;
-    let (l21, l31) = (h.m21 / d1, h.m31 / d1);
-    let d2 = h.m22 - l21 * h.m21;
-    let v32 = h.m32 - l31 * h.m21;
-    let l32 = v32 / d2;
-    let d3 = h.m33 - l31 * h.m31 - l32 * v32;
-    if !(d1 > 0.0 && d2 > 0.0 && d3 > 0.0) {
-        return None;
-    }
-    let y2 = g.y - l21 * g.x;
-    let y3 = g.z - l31 * g.x - l32 * y2;
-    let z = y3 / d3;
-    let y = y2 / d2 - l32 * z;
-    Some(Vector3::new(g.x / d1 - l21 * y - l31 * z, y, z))
+    let upper = [h.m11, h.m12, h.m13, h.m22, h.m23, h.m33];
+    let inverse = positive_inverse(&upper, [1.0; 3], 0.0)?;
+    Some(Vector3::from(times(&inverse, [g.x, g.y, g.z])))
 }
 
 /// Solves with the Hessian, lifted until it is positive definite so that the step descends.

@@ -6,8 +6,8 @@
 
 use nalgebra::{Matrix6, Rotation3, Vector3};
 
+use super::information::{Solver, Vector};
 use super::residuals::{Residuals, Slope};
-use super::symmetric6::{Factor, Vector};
 use crate::geometry::cayley;
 
 /// Steps after which a fit is given up; two or three are usual.
@@ -66,7 +66,7 @@ pub(crate) fn maximum_likelihood(
         .ok_or(FitFailure::StartNotVisible)?;
     let mut damping = 0.0;
     for iteration in 1..=MAX_ITERATIONS {
-        let Some(factor) = Factor::new(&here.damped(damping)) else {
+        let Some(solver) = here.information.damped(damping).solver() else {
             if damping == 0.0 && iteration > 1 {
                 // Not singular at the start: a bad step led here. Damp it.
                 damping = 1e-3;
@@ -74,13 +74,13 @@ pub(crate) fn maximum_likelihood(
             }
             return Err(FitFailure::Singular);
         };
-        let step = factor.solve(&here.slope.gradient).map(|value| -value);
+        let step = solver.solve(&here.slope.gradient).map(|value| -value);
         let gain = -dot(&step, &here.slope.gradient);
         if damping == 0.0 && gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
-            return finish(&pose.moved(&step), &here.slope, gain, &factor, iteration);
+            return finish(&pose.moved(&step), &here.slope, gain, &solver, iteration);
         }
         if damping > 0.0
-            && let Some(undamped) = Factor::new(&here.damped(0.0))
+            && let Some(undamped) = here.information.solver()
         {
             // In a valley more curved than its slopes tell, full steps would overshoot for ever.
             let gradient = &here.slope.gradient;
@@ -95,10 +95,10 @@ pub(crate) fn maximum_likelihood(
             && let Some(there) = residuals.slope(&trial)
             && there.chi_squared <= here.slope.chi_squared
         {
-            let last = factor.solve(&there.gradient).map(|value| -value);
+            let last = solver.solve(&there.gradient).map(|value| -value);
             let gain = -dot(&last, &there.gradient);
             if gain < GAIN_TOLERANCE.max(ROUNDING * there.chi_squared) {
-                return finish(&trial.moved(&last), &there, gain, &factor, iteration + 1);
+                return finish(&trial.moved(&last), &there, gain, &solver, iteration + 1);
             }
         }
         match residuals.linearise(&trial) {
@@ -122,11 +122,11 @@ fn finish(
     pose: &CentredPose,
     here: &Slope,
     gain: f64,
-    factor: &Factor,
+    solver: &Solver,
     iterations: u16,
 ) -> Result<Fit, FitFailure> {
     let chi_squared = (here.chi_squared - gain).max(0.0);
-    let covariance = factor.inverse();
+    let covariance = solver.covariance();
     // The last step changes both sums alike; it is too short to be worth another look at the points.
     let share = if here.chi_squared > 0.0 {
         chi_squared / here.chi_squared

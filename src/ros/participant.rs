@@ -34,7 +34,7 @@ use super::qos_overrides::{QosOverrides, Role};
 
 /// How long the participants of a host get to find each other before the first endpoint is announced.
 ///
-/// RustDDS announces endpoints without a source timestamp. Fast DDS orders what it cannot deliver yet by that
+/// `RustDDS` announces endpoints without a source timestamp. Fast DDS orders what it cannot deliver yet by that
 /// stamp, and loses announcements for good when two such participants have some that it must ask for again. It
 /// asks for none that come after it has found their participant, or all at once from one that was there before.
 const ACQUAINTANCE: Duration = Duration::from_millis(150);

@@ -5,10 +5,10 @@ use nalgebra::{Isometry3, Vector3};
 use super::lag::{Lag, MEMORY_FRAMES};
 use super::model::{Innovation, Noise, add_noise, predict};
 use super::settings::Checked;
+use super::symmetric6::{Factor, rows};
 use super::{
     FilterSettings, FilterSettingsError, MeasurementError, PredictError, StartReason, TrackOutcome,
 };
-use crate::estimation::symmetric6::{Factor, rows};
 use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
 /// The motion of the tanker in the camera at the time of one image.

@@ -19,6 +19,7 @@ mod lag;
 mod model;
 mod outcome;
 mod settings;
+mod symmetric6;
 
 pub use filter::{Filter, Track};
 pub use outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};

@@ -12,7 +12,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::estimation::symmetric6::{Factor, rows};
+use super::symmetric6::{Factor, rows};
 use crate::geometry::{Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error};
 
 /// Two-sided spectral densities, squared: what each second adds to a variance.

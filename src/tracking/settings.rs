@@ -43,7 +43,7 @@ impl Default for FilterSettings {
     /// A receiver that keeps station or closes slowly, in the air behind a tanker.
     fn default() -> Self {
         Self {
-            acceleration_density_mps2: 0.2,
+            acceleration_density_mps2: 0.15,
             angular_acceleration_density_dps2: 4.0,
             manoeuvre_factor: 5.0,
             initial_speed_sigma_mps: 3.0,

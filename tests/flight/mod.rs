@@ -10,7 +10,7 @@ use tanker_pose::camera::Pixel;
 use tanker_pose::estimation::{
     Estimator, EstimatorSettings, Initialisation, Observation, Solution,
 };
-use tanker_pose::geometry::{Matrix12, Motion};
+use tanker_pose::geometry::{Matrix12, Motion, pose_error};
 use tanker_pose::pipeline;
 use tanker_pose::simulation::{Approach, ApproachSettings, Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::MarkerMap;
@@ -118,31 +118,76 @@ fn seen(pose: &Isometry3<f64>, random: &mut ChaCha8Rng) -> Vec<Observation> {
 /// A motion drawn from the filter's own model, 40 m ahead: start and noise have the settings' variances.
 pub fn drawn(seed: u64, duration_s: f64, settings: &FilterSettings) -> Vec<Frame> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let dt = 1.0 / RATE_HZ;
-    let acceleration = settings.acceleration_density_mps2;
-    let angular = settings.angular_acceleration_density_dps2.to_radians();
-    let mut now = motion(
+    let start = motion(
         pose_in_camera(Vector3::new(40.0, 0.0, 12.0), 1.0, -2.0, 2.0),
         normal3(&mut random) * settings.initial_speed_sigma_mps,
         normal3(&mut random) * settings.initial_rate_sigma_dps.to_radians(),
     );
+    disturbed(start, duration_s, settings, &mut random, |_, _| {
+        (Vector3::zeros(), Vector3::zeros())
+    })
+}
+
+/// 60 m to 12 m in 50 s in air of the settings' own noise: autopilot and pilot bring the receiver back to
+/// its path within some seconds, of which the filter knows nothing.
+pub fn rough_approach(seed: u64, settings: &FilterSettings) -> Vec<Frame> {
+    const DURATION_S: f64 = 50.0;
+    const SPEED_MPS: f64 = (60.0 - 12.0) / DURATION_S;
+    /// rad/s, of the restoring motion, which is damped by 0.7.
+    const POSITION_RATE: f64 = 0.4;
+    const ATTITUDE_RATE: f64 = 1.0;
+    let planned = |time_s: f64| {
+        let range_m = 60.0 - SPEED_MPS * time_s;
+        pose_in_camera(Vector3::new(range_m, 0.0, 0.3 * range_m), 0.0, 0.0, 0.0)
+    };
+    let planned_velocity = planned(1.0).translation.vector - planned(0.0).translation.vector;
+    let start = motion(planned(0.0), planned_velocity, Vector3::zeros());
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    disturbed(start, DURATION_S, settings, &mut random, |time_s, now| {
+        let to_plan = pose_error(&planned(time_s), &now.b_from_a);
+        let (away, turned) = (
+            to_plan.fixed_rows::<3>(0).into_owned(),
+            to_plan.fixed_rows::<3>(3).into_owned(),
+        );
+        let slip = now.velocity_in_b - planned_velocity;
+        (
+            away * POSITION_RATE.powi(2) - slip * (1.4 * POSITION_RATE),
+            turned * ATTITUDE_RATE.powi(2) - now.rate_in_b * (1.4 * ATTITUDE_RATE),
+        )
+    })
+}
+
+/// Returns a motion that white noise of the settings' densities drives, besides the linear and angular
+/// acceleration that `steer` answers to a time and a motion.
+fn disturbed(
+    start: Motion,
+    duration_s: f64,
+    settings: &FilterSettings,
+    random: &mut ChaCha8Rng,
+    steer: impl Fn(f64, &Motion) -> (Vector3<f64>, Vector3<f64>),
+) -> Vec<Frame> {
+    let dt = 1.0 / RATE_HZ;
+    let acceleration = settings.acceleration_density_mps2;
+    let angular = settings.angular_acceleration_density_dps2.to_radians();
+    let mut now = start;
     let mut frames = Vec::new();
     let mut time_s = 0.0;
     while time_s <= duration_s + 0.5 * dt {
         frames.push(Frame {
             stamp_ns: stamp_ns(time_s),
             truth: now,
-            observations: seen(&now.b_from_a, &mut random),
+            observations: seen(&now.b_from_a, random),
         });
+        let (pull, twist) = steer(time_s, &now);
         // The integral of white noise over a step, and the integral of that, are correlated.
-        let mut step = |density: f64| {
-            let (first, second) = (normal3(&mut random), normal3(&mut random));
-            let gained = first * (density * dt.sqrt());
+        let mut step = |density: f64, steered: Vector3<f64>| {
+            let (first, second) = (normal3(random), normal3(random));
+            let gained = first * (density * dt.sqrt()) + steered * dt;
             let moved = gained * (dt / 2.0) + second * (density * (dt.powi(3) / 12.0).sqrt());
             (moved, gained)
         };
-        let (moved, gained) = step(acceleration);
-        let (turned, spun) = step(angular);
+        let (moved, gained) = step(acceleration, pull);
+        let (turned, spun) = step(angular, twist);
         now = motion(
             Isometry3::from_parts(
                 Translation3::from(

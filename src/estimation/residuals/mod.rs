@@ -10,8 +10,8 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
+use super::information::{Information, Vector};
 use super::refine::CentredPose;
-use super::symmetric6::Vector;
 
 pub(crate) use lens::LensResiduals;
 pub(crate) use pinhole::PinholeResiduals;
@@ -19,8 +19,8 @@ pub(crate) use pinhole::PinholeResiduals;
 /// Squared residuals and their first derivatives at a pose; rotation before position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Linearised {
-    /// `JᵀJ`, lower triangle.
-    information: [[f64; 6]; 6],
+    /// `JᵀJ`.
+    pub(crate) information: Information,
     pub(crate) slope: Slope,
 }
 
@@ -31,18 +31,6 @@ pub(crate) struct Slope {
     pub(crate) chi_squared: f64,
     /// px², over columns and rows.
     pub(crate) squared_residuals_px: f64,
-}
-
-impl Linearised {
-    /// Returns the information with its diagonal raised by a share.
-    #[inline(always)]
-    pub(crate) fn damped(&self, share: f64) -> [[f64; 6]; 6] {
-        let mut damped = self.information;
-        for (i, row) in damped.iter_mut().enumerate() {
-            row[i] *= 1.0 + share;
-        }
-        damped
-    }
 }
 
 /// What is minimised.

@@ -2,6 +2,7 @@
 
 use super::{Linearised, Slope};
 use crate::estimation::four::{Arithmetic, Four, Number, totals};
+use crate::estimation::information::Information;
 
 /// Sums over points of `M`, `[a]× M`, `[a]× M [a]×ᵀ`, `s`, `a × s` and the squared residuals.
 #[derive(Clone, Copy)]
@@ -143,17 +144,13 @@ impl<N: Number> Sums<N> {
 impl Sums<f64> {
     #[inline(always)]
     pub(super) fn finish(&self) -> Option<Linearised> {
-        let (t, m, p) = (&self.turn, &self.mixed, &self.point);
         self.slope.finish().map(|slope| Linearised {
             slope,
-            information: [
-                [t[0], 0.0, 0.0, 0.0, 0.0, 0.0],
-                [t[1], t[3], 0.0, 0.0, 0.0, 0.0],
-                [t[2], t[4], t[5], 0.0, 0.0, 0.0],
-                [m[0][0], m[1][0], m[2][0], p[0], 0.0, 0.0],
-                [m[0][1], m[1][1], m[2][1], p[1], p[3], 0.0],
-                [m[0][2], m[1][2], m[2][2], p[2], p[4], p[5]],
-            ],
+            information: Information {
+                turn: self.turn,
+                mixed: self.mixed,
+                position: self.point,
+            },
         })
     }
 }
