@@ -8,7 +8,9 @@
 
 mod flight;
 
-use flight::{Frame, RATE_HZ, Record, approach, drawn, fly, manoeuvre, rough_approach, stamp_ns};
+use flight::{
+    Frame, RATE_HZ, Record, approach, drawn, fly, jerk, manoeuvre, rough_approach, stamp_ns,
+};
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use tanker_pose::estimation::Observation;
@@ -247,6 +249,45 @@ fn a_manoeuvre_is_noticed_and_does_not_make_the_track_claim_too_much() {
     assert!(beyond < 0.1, "{beyond}");
     // The scenario is one that needs it.
     assert!(too_sure > 2.0 * honest && mostly > 0.5);
+}
+
+/// Faster than the gate lets the lag show: the frames that contradict the track become the next one.
+#[test]
+fn a_sudden_acceleration_is_followed_within_half_a_second() {
+    const FLIGHTS: u64 = 20;
+    const QUIET_S: f64 = 2.0;
+    const MOST_FRAMES: usize = 15;
+    /// Squared distance in sigmas of the pose that no honest covariance shows.
+    const FAR: f64 = 60.0;
+    for acceleration_mps2 in [3.0, 5.0, 10.0] {
+        let (mut longest, mut swaps) = (0, 0);
+        for seed in 1..=FLIGHTS {
+            let frames = jerk(seed, acceleration_mps2, QUIET_S, QUIET_S + 2.0);
+            let records = fly(&frames, &FilterSettings::default(), |_| false);
+            let mut run = 0;
+            for record in records.iter().filter(|r| r.time_s >= QUIET_S) {
+                swaps += usize::from(record.outcome == TrackOutcome::Acquired);
+                let is_far = record.track.is_some_and(|track| {
+                    let error = pose_error(&record.truth.b_from_a, &track.b_from_a);
+                    let squared = track.pose_covariance().mahalanobis_squared(&error);
+                    squared.is_none_or(|squared| squared > FAR)
+                });
+                run = if is_far { run + 1 } else { 0 };
+                longest = longest.max(run);
+            }
+            assert_eq!(
+                run, 0,
+                "{acceleration_mps2} m/s², seed {seed}: still far off"
+            );
+        }
+        println!(
+            "{acceleration_mps2} m/s²: far off for {longest} frames at most, {swaps} tracks begun anew in {FLIGHTS} flights"
+        );
+        assert!(
+            longest <= MOST_FRAMES,
+            "{acceleration_mps2} m/s²: {longest}"
+        );
+    }
 }
 
 /// Returns the image with the ids of every pair of left and right markers of the paper's map exchanged.

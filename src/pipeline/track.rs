@@ -1,8 +1,7 @@
 //! What a frame does to the track, and what the track does for a frame.
 //!
-//! The track never touches a single frame's pose, with one exception, in [`Tracker::choice`]: of two poses that
-//! an image cannot tell apart it may choose. A frame so chosen does not correct the track, so that a wrong track
-//! cannot feed itself: [`FilterSettings::max_gap_s`] after the last frame that stood on its own, it ends.
+//! The track never touches a single frame's pose. With `initialisation: previous` the iteration starts from
+//! its prediction, and where wrong detections have to be found the same prediction says what is plausible.
 
 use nalgebra::Rotation3;
 

@@ -48,6 +48,27 @@ pub struct Filter {
     settings: FilterSettings,
     checked: Checked,
     state: Option<State>,
+    /// What the frames say that the gate refuses, one after the other: a track of their own, if they agree.
+    challenger: Option<State>,
+}
+
+/// What a pose does to a track or candidate.
+enum Step {
+    Accepted {
+        state: State,
+        innovation_squared: f64,
+    },
+    Contradicts {
+        innovation_squared: f64,
+    },
+    LostPrecision,
+}
+
+/// A pose with its time, the floor added to its covariance.
+struct Measured<'a> {
+    stamp_ns: i64,
+    camera_from_tanker: &'a Isometry3<f64>,
+    covariance: PoseCovariance,
 }
 
 impl Filter {
@@ -60,6 +81,7 @@ impl Filter {
             settings,
             checked: settings.check()?,
             state: None,
+            challenger: None,
         })
     }
 
@@ -82,6 +104,7 @@ impl Filter {
     /// Forgets track and candidate; the next pose is the first.
     pub fn reset(&mut self) {
         self.state = None;
+        self.challenger = None;
     }
 
     /// Returns the track at the last accepted frame; none while it is not confirmed.
@@ -142,6 +165,9 @@ impl Filter {
 
     /// Takes the pose of one frame and returns what became of it.
     ///
+    /// Frames that contradict the track but agree with each other, as many as make a track, end it and are
+    /// the next one: a motion that outran the gate is not coasted away from.
+    ///
     /// # Inputs
     /// * `stamp_ns`: when the image was taken.
     /// * `camera_from_tanker`, `covariance`: a trusted estimate, whose error is independent of those of
@@ -155,7 +181,11 @@ impl Filter {
         if let Err(error) = check(camera_from_tanker, covariance) {
             return TrackOutcome::Invalid(error);
         }
-        let measured = (stamp_ns, camera_from_tanker, self.with_floor(covariance));
+        let measured = Measured {
+            stamp_ns,
+            camera_from_tanker,
+            covariance: self.with_floor(covariance),
+        };
         let Some(mut state) = self.state else {
             return self.start(&measured, StartReason::First);
         };
@@ -166,25 +196,64 @@ impl Filter {
         };
         state.seen_ns = state.seen_ns.max(stamp_ns);
         let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
-        let mut predicted = predict(&state.track.motion, gap_s, self.noise(&state.lag));
-        let innovate = |from: &Motion| Innovation::new(from, camera_from_tanker, &measured.2);
-        let Some(mut innovation) = innovate(&predicted) else {
-            return self.start(&measured, StartReason::LostPrecision);
-        };
-        let (innovation_squared, limit) = (innovation.squared, self.checked.gate);
-        if innovation_squared > limit {
-            if is_confirmed {
+        let limit = self.checked.gate;
+        match self.step(&state, gap_s, &measured) {
+            Step::LostPrecision => self.start(&measured, StartReason::LostPrecision),
+            Step::Contradicts { innovation_squared } if is_confirmed => {
                 self.state = Some(state);
-                return TrackOutcome::Gated {
+                self.challenge(&measured);
+                if self
+                    .challenger
+                    .is_some_and(|rival| self.is_confirmed(&rival))
+                {
+                    self.state = self.challenger.take();
+                    return TrackOutcome::Acquired;
+                }
+                TrackOutcome::Gated {
+                    innovation_squared,
+                    limit,
+                }
+            }
+            Step::Contradicts { innovation_squared } => {
+                let reason = StartReason::Inconsistent {
                     innovation_squared,
                     limit,
                 };
+                self.start(&measured, reason)
             }
-            let reason = StartReason::Inconsistent {
+            Step::Accepted {
+                state,
                 innovation_squared,
-                limit,
-            };
-            return self.start(&measured, reason);
+            } => {
+                self.state = Some(state);
+                self.challenger = None;
+                let needed = self.checked.confirm_frames;
+                if is_confirmed {
+                    TrackOutcome::Updated { innovation_squared }
+                } else if self.is_confirmed(&state) {
+                    TrackOutcome::Acquired
+                } else {
+                    TrackOutcome::Confirming {
+                        consistent_frames: state.consistent_frames,
+                        needed,
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns what a pose makes of a track or candidate, `gap_s` after its last frame.
+    fn step(&self, state: &State, gap_s: f64, measured: &Measured) -> Step {
+        let mut predicted = predict(&state.track.motion, gap_s, self.noise(&state.lag));
+        let innovate = |from: &Motion| {
+            Innovation::new(from, measured.camera_from_tanker, &measured.covariance)
+        };
+        let Some(mut innovation) = innovate(&predicted) else {
+            return Step::LostPrecision;
+        };
+        let innovation_squared = innovation.squared;
+        if innovation_squared > self.checked.gate {
+            return Step::Contradicts { innovation_squared };
         }
         let lag = state
             .lag
@@ -197,28 +266,42 @@ impl Filter {
                 &self.checked.manoeuvre_noise,
             );
             let Some(again) = innovate(&predicted) else {
-                return self.start(&measured, StartReason::LostPrecision);
+                return Step::LostPrecision;
             };
             innovation = again;
         }
         let Some(motion) = innovation.corrected(&predicted) else {
-            return self.start(&measured, StartReason::LostPrecision);
+            return Step::LostPrecision;
         };
-        state.track = Track { stamp_ns, motion };
-        state.lag = lag;
-        state.consistent_frames = state.consistent_frames.saturating_add(1);
-        self.state = Some(state);
-        let (consistent_frames, needed) = (state.consistent_frames, self.checked.confirm_frames);
-        if is_confirmed {
-            TrackOutcome::Updated { innovation_squared }
-        } else if consistent_frames >= needed {
-            TrackOutcome::Acquired
-        } else {
-            TrackOutcome::Confirming {
-                consistent_frames,
-                needed,
-            }
+        Step::Accepted {
+            state: State {
+                track: Track {
+                    stamp_ns: measured.stamp_ns,
+                    motion,
+                },
+                consistent_frames: state.consistent_frames.saturating_add(1),
+                lag,
+                ..*state
+            },
+            innovation_squared,
         }
+    }
+
+    /// Takes a pose that the gate has refused for the track that such poses may make.
+    fn challenge(&mut self, measured: &Measured) {
+        let going_on = self.challenger.and_then(|rival| {
+            let Place::Next { gap_s } = self.place(&rival, measured.stamp_ns) else {
+                return None;
+            };
+            match self.step(&rival, gap_s, measured) {
+                Step::Accepted { state, .. } => Some(State {
+                    seen_ns: measured.stamp_ns,
+                    ..state
+                }),
+                Step::Contradicts { .. } | Step::LostPrecision => None,
+            }
+        });
+        self.challenger = Some(going_on.unwrap_or_else(|| self.candidate(measured)));
     }
 
     fn place(&self, state: &State, stamp_ns: i64) -> Place {
@@ -239,55 +322,63 @@ impl Filter {
 
     /// Tells the filter of a frame that gave no pose, and returns whether the track outlives it.
     pub fn miss(&mut self, stamp_ns: i64) -> TrackOutcome {
-        let Some(state) = &self.state else {
+        let Some(state) = self.state else {
             return TrackOutcome::Idle;
         };
-        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
-        if gap_s > self.checked.max_gap_s {
-            self.state = None;
-            return TrackOutcome::Dropped { gap_s };
-        }
-        if stamp_ns == state.track.stamp_ns {
-            return TrackOutcome::Duplicate { stamp_ns };
-        }
-        if gap_s < 0.0 {
-            return TrackOutcome::Late { late_by_s: -gap_s };
-        }
-        TrackOutcome::Coasting { gap_s }
+        let outcome = match self.place(&state, stamp_ns) {
+            Place::Unusable(outcome) => return outcome,
+            Place::Elsewhere(_) => {
+                self.reset();
+                return TrackOutcome::Dropped {
+                    gap_s: seconds(stamp_ns, state.track.stamp_ns),
+                };
+            }
+            Place::Next { gap_s } => TrackOutcome::Coasting { gap_s },
+        };
+        self.state = Some(State {
+            seen_ns: state.seen_ns.max(stamp_ns),
+            ..state
+        });
+        outcome
     }
 
     fn confirmed(&self) -> Option<&State> {
-        self.state
-            .as_ref()
-            .filter(|state| state.consistent_frames >= self.checked.confirm_frames)
+        self.state.as_ref().filter(|state| self.is_confirmed(state))
     }
 
-    fn start(
-        &mut self,
-        (stamp_ns, camera_from_tanker, covariance): &(i64, &Isometry3<f64>, PoseCovariance),
-        reason: StartReason,
-    ) -> TrackOutcome {
+    fn is_confirmed(&self, state: &State) -> bool {
+        state.consistent_frames >= self.checked.confirm_frames
+    }
+
+    fn start(&mut self, measured: &Measured, reason: StartReason) -> TrackOutcome {
+        self.state = Some(self.candidate(measured));
+        self.challenger = None;
+        TrackOutcome::Started(reason)
+    }
+
+    /// Returns the candidate that begins with this frame.
+    fn candidate(&self, measured: &Measured) -> State {
         let mut full = Matrix12::zeros();
-        full.fixed_view_mut::<6, 6>(0, 0).copy_from(&covariance.0);
+        full.fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(&measured.covariance.0);
         for axis in 0..3 {
             full[(6 + axis, 6 + axis)] = self.checked.initial_speed_variance;
             full[(9 + axis, 9 + axis)] = self.checked.initial_rate_variance;
         }
-        self.state = Some(State {
+        State {
             track: Track {
-                stamp_ns: *stamp_ns,
+                stamp_ns: measured.stamp_ns,
                 motion: Motion {
-                    b_from_a: **camera_from_tanker,
+                    b_from_a: *measured.camera_from_tanker,
                     velocity_in_b: Vector3::zeros(),
                     rate_in_b: Vector3::zeros(),
                     covariance: full,
                 },
             },
             consistent_frames: 1,
-            seen_ns: *stamp_ns,
+            seen_ns: measured.stamp_ns,
             lag: Lag::default(),
-        });
-        TrackOutcome::Started(reason)
+        }
     }
 
     fn noise(&self, lag: &Lag) -> &Noise {

@@ -15,7 +15,8 @@ pub enum TrackOutcome {
         /// Frames needed.
         needed: u32,
     },
-    /// It was the last one that the candidate needed: from here on there is a track.
+    /// It was the last one that the candidate needed: from here on there is a track. If there was one before,
+    /// the last frames have contradicted it and agreed with each other.
     Acquired,
     /// It agrees with the track and has corrected it.
     Updated {
@@ -46,9 +47,10 @@ pub enum TrackOutcome {
         /// Since the last accepted frame, s.
         gap_s: f64,
     },
-    /// A frame without a pose, longer than `max_gap_s` after the last accepted one: the track is dropped.
+    /// A frame without a pose, longer than `max_gap_s` after the last accepted one, or as long before it: the
+    /// track is dropped.
     Dropped {
-        /// Since the last accepted frame, s.
+        /// Since the last accepted frame, s; negative when stamps went back.
         gap_s: f64,
     },
     /// A frame without a pose, and no track or candidate to go on.

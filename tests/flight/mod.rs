@@ -254,7 +254,6 @@ pub const MANOEUVRE_DPS: f64 = 5.0;
 /// A quiet second 25 m ahead, then a manoeuvre to both sides, never smooth: the acceleration jumps
 /// between its limits, and so does the rate.
 pub fn manoeuvre(seed: u64, quiet_s: f64, duration_s: f64) -> Vec<Frame> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
     let pose = |time_s: f64| {
         let t = (time_s - quiet_s).max(0.0);
         // Between two reversals the path is a parabola; it begins at the top of one.
@@ -269,6 +268,23 @@ pub fn manoeuvre(seed: u64, quiet_s: f64, duration_s: f64) -> Vec<Frame> {
         let roll_deg = MANOEUVRE_DPS * (1.0 - (phase - 2.0).abs());
         pose_in_camera(Vector3::new(25.0, lateral_m, 7.5), roll_deg, 1.0, -1.0)
     };
+    sampled(seed, duration_s, pose)
+}
+
+/// Station 15 m ahead, then a lateral acceleration from one moment to the next, held for a second.
+pub fn jerk(seed: u64, acceleration_mps2: f64, quiet_s: f64, duration_s: f64) -> Vec<Frame> {
+    const PUSH_S: f64 = 1.0;
+    sampled(seed, duration_s, |time_s| {
+        let t = (time_s - quiet_s).max(0.0);
+        let pushed = t.min(PUSH_S);
+        let lateral_m = acceleration_mps2 * pushed * (t - 0.5 * pushed);
+        pose_in_camera(Vector3::new(15.0, lateral_m, 4.5), 0.0, 1.0, -1.0)
+    })
+}
+
+/// Images of a motion, its velocity by differences.
+fn sampled(seed: u64, duration_s: f64, pose: impl Fn(f64) -> Isometry3<f64>) -> Vec<Frame> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
     let step_s = 1.0 / RATE_HZ;
     let mut frames = Vec::new();
     let mut time_s = 0.0;

@@ -117,18 +117,79 @@ fn a_track_is_dropped_after_the_gap_and_needs_confirmation_again() {
 }
 
 #[test]
-fn poses_that_go_on_contradicting_the_track_end_it() {
+fn poses_that_contradict_the_track_but_not_each_other_are_the_next_one() {
+    let mut filter = tracking();
+    for k in 5..9 {
+        let outcome = filter.update(EPOCH_NS + k * FRAME_NS, &pose(6.0), &covariance());
+        assert!(matches!(outcome, TrackOutcome::Gated { .. }), "{outcome:?}");
+        let x = filter
+            .track()
+            .expect("the old one")
+            .motion
+            .b_from_a
+            .translation
+            .x;
+        assert!(x.abs() < 0.1);
+    }
+    let outcome = filter.update(EPOCH_NS + 9 * FRAME_NS, &pose(6.0), &covariance());
+    assert_eq!(outcome, TrackOutcome::Acquired);
+    let x = filter
+        .track()
+        .expect("the new one")
+        .motion
+        .b_from_a
+        .translation
+        .x;
+    assert!((x - 6.0).abs() < 0.1);
+}
+
+#[test]
+fn poses_that_contradict_the_track_and_each_other_end_it_after_the_gap() {
     let mut filter = tracking();
     let mut restarted = None;
     for k in 5..60 {
-        let outcome = filter.update(EPOCH_NS + k * FRAME_NS, &pose(6.0), &covariance());
+        let wrong = if k % 2 == 0 { 6.0 } else { -6.0 };
+        let outcome = filter.update(EPOCH_NS + k * FRAME_NS, &pose(wrong), &covariance());
         if let TrackOutcome::Started(StartReason::Gap { gap_s }) = outcome {
             restarted = Some(gap_s);
-            assert!(filter.track().is_none());
         }
+        assert!(outcome != TrackOutcome::Acquired);
     }
     assert!(restarted.is_some_and(|gap_s| gap_s > 1.0 && gap_s < 1.1));
-    assert!(filter.track().is_some());
+    assert!(filter.track().is_none());
+}
+
+#[test]
+fn wrong_poses_between_right_ones_never_become_a_track() {
+    let mut filter = tracking();
+    for k in 5..100 {
+        let is_right = k % 5 == 0;
+        let shown = pose(if is_right { 0.0 } else { 6.0 });
+        let outcome = filter.update(EPOCH_NS + k * FRAME_NS, &shown, &covariance());
+        assert_eq!(
+            matches!(outcome, TrackOutcome::Updated { .. }),
+            is_right,
+            "{outcome:?}"
+        );
+    }
+}
+
+#[test]
+fn lost_frames_whose_stamps_went_back_end_the_track_too() {
+    let mut filter = tracking();
+    let last = EPOCH_NS + 4 * FRAME_NS;
+    let outcome = filter.miss(last - 2_000_000_000);
+    assert_eq!(outcome, TrackOutcome::Dropped { gap_s: -2.0 });
+    assert!(filter.track().is_none());
+    // A lost frame has been seen, whatever comes under its stamp.
+    let mut filter = tracking();
+    assert!(matches!(
+        filter.miss(last + FRAME_NS),
+        TrackOutcome::Coasting { .. }
+    ));
+    let stamp_ns = last + FRAME_NS;
+    let outcome = filter.update(stamp_ns, &pose(0.0), &covariance());
+    assert_eq!(outcome, TrackOutcome::Duplicate { stamp_ns });
 }
 
 #[test]
