@@ -43,10 +43,10 @@ struct Outcome {
     beyond_30: usize,
 }
 
-fn run(depth_m: f64, range_m: f64, tilt_deg: f64) -> Outcome {
+fn run(refinement: Refinement, depth_m: f64, range_m: f64, tilt_deg: f64) -> Outcome {
     let estimator = Estimator::new(EstimatorSettings {
         max_ambiguity: MAX_AMBIGUITY,
-        ..settings(Initialisation::Nominal, Refinement::MaximumLikelihood)
+        ..settings(Initialisation::Nominal, refinement)
     });
     let mut random = ChaCha8Rng::seed_from_u64(12);
     let mut outcome = Outcome::default();
@@ -76,20 +76,30 @@ fn run(depth_m: f64, range_m: f64, tilt_deg: f64) -> Outcome {
     outcome
 }
 
+/// Share of accepted frames that may lie beyond 30, where a Gaussian has one in 25,000: one in fifty, and what
+/// chance makes of a few.
+fn most_beyond_30(accepted: usize) -> usize {
+    accepted / 50 + 4
+}
+
 /// Without widening the mean NEES reaches 20 here, and a fifth of the accepted frames lies beyond 30.
 #[test]
 fn covariance_of_a_flat_target_stays_near_the_truth_face_on() {
-    for (depth_m, range_m) in [(0.0, 10.0), (0.0, 20.0), (0.3, 10.0), (0.3, 20.0)] {
-        for tilt_deg in [0.0, 5.0, 10.0, 20.0] {
-            let found = run(depth_m, range_m, tilt_deg);
-            println!(
-                "{depth_m} m deep, {range_m} m away, {tilt_deg}° tilted: {} of {FRAMES} accepted, NEES {:.2}, beyond 30: {}",
-                found.accepted, found.nees, found.beyond_30
-            );
-            assert!(found.accepted > FRAMES / 4, "silence would prove nothing");
-            assert!(found.nees < 9.0, "{found:?}");
-            // Of a Gaussian one in 25,000.
-            assert!(found.beyond_30 < FRAMES / 50, "{found:?}");
+    for refinement in [Refinement::MaximumLikelihood, Refinement::None] {
+        for (depth_m, range_m) in [(0.0, 10.0), (0.0, 20.0), (0.3, 10.0), (0.3, 20.0)] {
+            for tilt_deg in [0.0, 5.0, 10.0, 20.0] {
+                let found = run(refinement, depth_m, range_m, tilt_deg);
+                println!(
+                    "{refinement:?}, {depth_m} m deep, {range_m} m away, {tilt_deg}° tilted: {} of {FRAMES} accepted, NEES {:.2}, beyond 30: {}",
+                    found.accepted, found.nees, found.beyond_30
+                );
+                assert!(found.accepted > FRAMES / 4, "silence would prove nothing");
+                assert!(found.nees < 9.0, "{found:?}");
+                assert!(
+                    found.beyond_30 <= most_beyond_30(found.accepted),
+                    "{found:?}"
+                );
+            }
         }
     }
 }
@@ -97,10 +107,15 @@ fn covariance_of_a_flat_target_stays_near_the_truth_face_on() {
 /// Far away nearly all frames are refused; of the few others none may be sure and wrong as a rule.
 #[test]
 fn a_flat_target_far_away_is_refused_rather_than_guessed() {
-    for depth_m in [0.0, 0.3] {
-        let found = run(depth_m, 40.0, 0.0);
-        println!("{depth_m} m deep, 40 m away: {found:?}");
-        assert!(found.accepted < FRAMES / 4, "{found:?}");
-        assert!(found.beyond_30 < FRAMES / 200, "{found:?}");
+    for refinement in [Refinement::MaximumLikelihood, Refinement::None] {
+        for depth_m in [0.0, 0.3] {
+            let found = run(refinement, depth_m, 40.0, 0.0);
+            println!("{refinement:?}, {depth_m} m deep, 40 m away: {found:?}");
+            assert!(found.accepted < FRAMES / 4, "{found:?}");
+            assert!(
+                found.beyond_30 <= most_beyond_30(found.accepted),
+                "{found:?}"
+            );
+        }
     }
 }

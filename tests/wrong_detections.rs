@@ -12,6 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::{distance_squared, oracle_maximum_likelihood, random_refuelling_scene};
 use tanker_pose::estimation::{Estimator, EstimatorSettings, Initialisation, Observation};
+use tanker_pose::geometry::pose_error;
+use tanker_pose::pipeline::solve;
 use tanker_pose::simulation::{Scene, paper_camera};
 use tanker_pose::target::Marker;
 
@@ -68,10 +70,33 @@ fn scene(count: usize, random: &mut ChaCha8Rng) -> Scene {
     Scene::with_markers(paper_camera(), markers, *scene.truth_camera_from_tanker())
 }
 
+#[derive(Default)]
 struct Tally {
     right: usize,
     refused: usize,
     wrong_but_trusted: usize,
+}
+
+impl Tally {
+    /// Counts a frame that is judged as the pipeline judges it.
+    fn count(
+        &mut self,
+        scene: &Scene,
+        seen: &[Observation],
+        wrong_ids: &[u32],
+        estimator: &Estimator,
+    ) {
+        let right = seen.iter().filter(|o| !wrong_ids.contains(&o.id));
+        let inliers: Vec<_> = right.copied().collect();
+        let truth =
+            oracle_maximum_likelihood(scene.camera(), &inliers, scene.truth_camera_from_tanker())
+                .expect("the oracle settles");
+        match solve(estimator, scene.camera(), seen, None).result {
+            Ok(solution) if distance_squared(&solution, &truth) < SAME_POSE => self.right += 1,
+            Ok(_) => self.wrong_but_trusted += 1,
+            Err(_) => self.refused += 1,
+        }
+    }
 }
 
 fn tally(count: usize, max_outliers: usize, seed: u64, fault: Fault) -> Tally {
@@ -81,33 +106,12 @@ fn tally(count: usize, max_outliers: usize, seed: u64, fault: Fault) -> Tally {
         ..Default::default()
     });
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut tally = Tally {
-        right: 0,
-        refused: 0,
-        wrong_but_trusted: 0,
-    };
+    let mut tally = Tally::default();
     for _ in 0..FRAMES {
         let scene = scene(count, &mut random);
         let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
         let wrong_ids = fault(&mut seen, &mut random);
-        let inliers: Vec<_> = seen
-            .iter()
-            .copied()
-            .filter(|o| !wrong_ids.contains(&o.id))
-            .collect();
-        let truth =
-            oracle_maximum_likelihood(scene.camera(), &inliers, scene.truth_camera_from_tanker())
-                .expect("the oracle settles");
-        match estimator.estimate(scene.camera(), &seen, None) {
-            Ok(solution) if solution.is_trusted() => {
-                if distance_squared(&solution, &truth) < SAME_POSE {
-                    tally.right += 1;
-                } else {
-                    tally.wrong_but_trusted += 1;
-                }
-            }
-            _ => tally.refused += 1,
-        }
+        tally.count(&scene, &seen, &wrong_ids, &estimator);
     }
     tally
 }
@@ -194,29 +198,137 @@ fn exchanged_sides_of_the_tanker_are_never_trusted() {
     }
 }
 
+/// As the node is set by default, and judged as the node judges: what README states.
 #[test]
-fn weak_points_do_not_stand_in_for_missing_checks() {
+fn one_wrong_point_of_six_is_left_out_by_the_node_s_defaults() {
     let estimator = Estimator::new(EstimatorSettings {
+        max_outliers: 1,
         min_points: 5,
+        max_ambiguity: 0.1,
         ..Default::default()
     });
-    let mut random = ChaCha8Rng::seed_from_u64(70);
-    for weak_sigma_px in [5.0, 30.0, 1000.0] {
-        let trusted = (0..500)
-            .filter(|_| {
-                let scene = scene(6, &mut random);
-                let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
-                seen.shuffle(&mut random);
-                for weak in &mut seen[..3] {
-                    weak.sigma_px = weak_sigma_px;
-                }
-                // An error of one of the three good ones, which nothing contradicts.
-                seen[5].pixel.u += random.random_range(10.0..60.0);
-                estimator
-                    .estimate(scene.camera(), &seen, None)
-                    .is_ok_and(|found| found.is_trusted())
-            })
-            .count();
-        assert_eq!(trusted, 0, "weak sigma {weak_sigma_px} px");
+    let mut random = ChaCha8Rng::seed_from_u64(80);
+    let mut tally = Tally::default();
+    for _ in 0..FRAMES {
+        let scene = scene(6, &mut random);
+        let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+        let wrong_ids = gross::<1>(&mut seen, &mut random);
+        seen.shuffle(&mut random);
+        tally.count(&scene, &seen, &wrong_ids, &estimator);
     }
+    let right = report("the node's defaults, 6 points, one gross", &tally);
+    assert!(right >= 97.0);
+    assert!(tally.wrong_but_trusted <= FRAMES / 300);
+}
+
+#[test]
+fn weak_points_do_not_stand_in_for_missing_checks() {
+    for max_outliers in [0, 1, 2] {
+        let estimator = Estimator::new(EstimatorSettings {
+            min_points: 5,
+            max_outliers,
+            ..Default::default()
+        });
+        let mut random = ChaCha8Rng::seed_from_u64(70);
+        for weak_sigma_px in [5.0, 30.0, 1000.0] {
+            let trusted = (0..500)
+                .filter(|_| {
+                    let scene = scene(6, &mut random);
+                    let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+                    seen.shuffle(&mut random);
+                    for weak in &mut seen[..3] {
+                        weak.sigma_px = weak_sigma_px;
+                    }
+                    // An error of one of the three good ones, which nothing contradicts.
+                    seen[5].pixel.u += random.random_range(10.0..60.0);
+                    estimator
+                        .estimate(scene.camera(), &seen, None)
+                        .is_ok_and(|found| found.is_trusted())
+                })
+                .count();
+            assert_eq!(trusted, 0, "weak sigma {weak_sigma_px} px");
+        }
+    }
+}
+
+/// Two points that claim far more than the others: wrong, they would rule the pose, and nothing could tell.
+#[test]
+fn precise_points_claim_no_more_than_the_others_can_check() {
+    let estimator = Estimator::new(EstimatorSettings {
+        min_points: 5,
+        max_outliers: 1,
+        max_ambiguity: 0.1,
+        ..Default::default()
+    });
+    for (seed, (precise_px, weak_px)) in
+        (90..).zip([(0.5, 5.0), (0.2, 2.0), (0.01, 1.0), (1.0, 1.0)])
+    {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let (mut wrong, mut accepted, mut nees) = (0, 0_u32, 0.0);
+        for _ in 0..FRAMES {
+            let scene = scene(6, &mut random);
+            let mut seen = scene.noisy_observations(precise_px, &mut random);
+            seen.shuffle(&mut random);
+            for weak in &mut seen[2..] {
+                let blur = scene.noisy_observations(weak_px, &mut random);
+                *weak = *blur
+                    .iter()
+                    .find(|other| other.id == weak.id)
+                    .expect("all are in view");
+            }
+            // Up to twelve times what the weak ones see.
+            seen[0].pixel.u += weak_px * random.random_range(2.0..12.0);
+            let outcome = solve(&estimator, scene.camera(), &seen, None);
+            let Ok(found) = outcome.result else {
+                continue;
+            };
+            let error = pose_error(scene.truth_camera_from_tanker(), &found.camera_from_tanker);
+            let squared = found.covariance.mahalanobis_squared(&error);
+            let squared = squared.expect("positive definite");
+            accepted += 1;
+            nees += squared;
+            wrong += usize::from(squared > SAME_POSE);
+        }
+        let mean = nees / f64::from(accepted);
+        println!(
+            "two points of {precise_px} px among {weak_px} px, one of them wrong: {accepted} of {FRAMES} accepted, mean NEES {mean:.1}, {wrong} beyond {SAME_POSE}"
+        );
+        assert!(accepted > 3000, "silence would prove nothing");
+        // Among equals an error so small passes often enough, with a mean of 18; as claimed it would be 500.
+        assert!(mean < 60.0);
+    }
+}
+
+#[test]
+fn a_wrong_point_among_many_is_found_wherever_it_stands_in_the_message() {
+    let estimator = Estimator::new(EstimatorSettings {
+        max_outliers: 1,
+        ..Default::default()
+    });
+    let mut random = ChaCha8Rng::seed_from_u64(81);
+    let mut found = 0;
+    for _ in 0..200 {
+        let markers = (1..=20).map(|id| Marker {
+            id,
+            marker_in_tanker: nalgebra::Point3::new(
+                random.random_range(0.0..8.0),
+                random.random_range(-7.0..7.0),
+                random.random_range(0.0..3.2),
+            ),
+        });
+        let markers = markers.collect();
+        let truth = *random_refuelling_scene(&mut random, 12.0, 40.0).truth_camera_from_tanker();
+        let scene = Scene::with_markers(paper_camera(), markers, truth);
+        let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+        let wrong = random.random_range(0..seen.len());
+        // So far off that the fit of all often ends behind the camera.
+        seen[wrong].pixel.u += 500.0;
+        let solution = estimator.estimate(scene.camera(), &seen, None);
+        found += usize::from(
+            solution.is_ok_and(|s| s.is_trusted() && s.excluded.contains(seen[wrong].id)),
+        );
+    }
+    println!("one of 20 points off by 500 px: found in {found} of 200 frames");
+    // The rest is refused.
+    assert!(found >= 195, "{found}");
 }

@@ -1,6 +1,6 @@
 //! The one call that turns observations into a judged pose.
 
-use nalgebra::{Point3, Rotation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
@@ -11,7 +11,9 @@ use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
 use super::widen::widened;
-use super::{EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Solution};
+use super::{
+    EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Refinement, Solution,
+};
 use crate::camera::{Camera, Ray};
 use crate::geometry::PoseCovariance;
 
@@ -20,6 +22,10 @@ const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
 /// Ratio of sigmas beyond which a point does not check the better ones.
 const WEAK_SIGMA_RATIO: f64 = 5.0;
+/// Ratio of sigmas beyond which a point claims more than the others can check.
+const BOLD_SIGMA_RATIO: f64 = 2.0;
+/// Points from which on `min_points` asks for checks: with four, errors mostly pass unseen whatever they claim.
+const CHECKED_FROM: usize = 5;
 /// rad; spread of the attitude about its prior: refuelling keeps the relative angles within ±5°.
 const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
@@ -72,15 +78,25 @@ impl Estimator {
         observations: &[Observation],
         previous: Option<&Rotation3<f64>>,
     ) -> Result<Solution, EstimateError> {
-        let solver = |points: &[Observation]| self.estimate_with_all(camera, points, previous);
-        let of_all = solver(observations);
+        self.check_count(observations)?;
+        let floored = with_sigma_floor(observations, self.settings.min_points);
+        let observations = floored.as_deref().unwrap_or(observations);
+        let of_all = self.estimate_with_all(camera, observations, previous);
         let max_outliers = self.settings.max_outliers;
-        if max_outliers == 0 || of_all.as_ref().is_ok_and(Solution::is_trusted) {
+        let is_final = match &of_all {
+            Ok(solution) => solution.is_trusted(),
+            // The lens says that there is no such pixel: a fault of the input, not a wrong detection.
+            Err(error) => matches!(error, EstimateError::NoRay { .. }),
+        };
+        if max_outliers == 0 || is_final {
             return of_all;
         }
-        let suspects = suspects(camera, observations, of_all.as_ref().ok());
+        let suspects = self.suspects(camera, observations, of_all.as_ref().ok(), previous);
         let judge = exclude::Judge {
-            solve: solver,
+            solve: |points: &[Observation]| {
+                self.check_count(points)?;
+                self.estimate_with_all(camera, points, previous)
+            },
             prior_cost: |solution: &Solution| self.prior_cost(solution, previous),
             min_remaining: match self.settings.initialisation {
                 Initialisation::Nominal | Initialisation::Previous => {
@@ -90,8 +106,29 @@ impl Estimator {
                     exclude::MIN_REMAINING_WITHOUT_PRIOR
                 }
             },
+            // The last attitude may have been a wrong one; the nominal one is the user's word.
+            is_prior_sure: self.settings.initialisation != Initialisation::Previous,
         };
         exclude::search(&judge, observations, &suspects, max_outliers).map_or(of_all, Ok)
+    }
+
+    /// Checks that there are enough points, and enough that check each other.
+    #[inline]
+    fn check_count(&self, observations: &[Observation]) -> Result<(), EstimateError> {
+        let (got, min_points) = (observations.len(), self.settings.min_points);
+        let need = min_points.max(self.settings.initialisation.min_points());
+        if got < need {
+            return Err(EstimateError::TooFewPoints { got, need });
+        }
+        let precise = count_checking(observations);
+        if precise < min_points {
+            return Err(EstimateError::TooFewPrecisePoints {
+                precise,
+                got,
+                need: min_points,
+            });
+        }
+        Ok(())
     }
 
     /// Returns the pose of all these points, or the reason for none.
@@ -102,21 +139,6 @@ impl Estimator {
         previous: Option<&Rotation3<f64>>,
     ) -> Result<Solution, EstimateError> {
         let start = self.settings.initialisation;
-        let need = self.settings.min_points.max(start.min_points());
-        if observations.len() < need {
-            return Err(EstimateError::TooFewPoints {
-                got: observations.len(),
-                need,
-            });
-        }
-        let precise = count_checking(observations);
-        if precise < self.settings.min_points {
-            return Err(EstimateError::TooFewPrecisePoints {
-                precise,
-                got: observations.len(),
-                need: self.settings.min_points,
-            });
-        }
         let mut room = Room::new();
         let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
         let nominal = || {
@@ -157,6 +179,41 @@ impl Estimator {
         } else {
             cost
         }
+    }
+
+    /// Indices of the points that may be left out: all of a few, of many those that fit worst. Without a
+    /// solution they are held against the attitude that is expected, where it suits them best.
+    fn suspects(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        of_all: Option<&Solution>,
+        previous: Option<&Rotation3<f64>>,
+    ) -> Suspects {
+        let most = exclude::max_suspects(observations.len());
+        let count = observations.len();
+        let pose = of_all
+            .map(|solution| solution.camera_from_tanker)
+            .or_else(|| {
+                let expected = previous.unwrap_or(&self.settings.nominal_camera_from_tanker);
+                (count > most).then(|| expected_pose(camera, observations, expected))?
+            });
+        let mut all: SmallVec<[(f64, usize); INLINE_POINTS]> = observations
+            .iter()
+            .enumerate()
+            .map(|(index, seen)| {
+                let residual = pose.and_then(|pose| seen.residual_px(camera, &pose));
+                (
+                    residual.map_or(f64::INFINITY, |r| r.norm() / seen.sigma_px),
+                    index,
+                )
+            })
+            .collect();
+        all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        all.truncate(most);
+        let mut suspects: Suspects = all.into_iter().map(|(_, index)| index).collect();
+        suspects.sort_unstable();
+        suspects
     }
 
     fn solve_from(
@@ -233,7 +290,7 @@ impl Estimator {
         let residuals = 2 * problem.observations.len();
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Solution {
-            camera_from_tanker: problem.pose(fit),
+            camera_from_tanker: problem.pose(&fit.pose),
             covariance: PoseCovariance::from_point(&widened(problem, fit), &lever),
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
@@ -255,11 +312,45 @@ fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
     })
 }
 
-/// Returns how many points are precise enough to check others: those whose sigma is at most
-/// [`WEAK_SIGMA_RATIO`] times that of the third best. Any three fix a pose; what is much weaker than
-/// they are could not contradict them, so it gives no redundancy.
-fn count_checking(observations: &[Observation]) -> usize {
-    // Nearly always all sigmas are alike.
+/// Returns the pose with a given attitude that suits the points best; none where their rays fix no position.
+fn expected_pose(
+    camera: &Camera,
+    observations: &[Observation],
+    attitude: &Rotation3<f64>,
+) -> Option<Isometry3<f64>> {
+    let mut room = Room::new();
+    let refinement = Refinement::MaximumLikelihood;
+    let problem = Problem::new(camera, refinement, observations, &mut room).ok()?;
+    Some(problem.pose(&problem.placed(attitude)))
+}
+
+/// Returns the points with sigmas that the others can answer for, if some are smaller: none counts as more
+/// precise than [`BOLD_SIGMA_RATIO`] times the `of_count`-th best. Two points far surer than the rest would rule
+/// the pose, and nothing could contradict them.
+fn with_sigma_floor(
+    observations: &[Observation],
+    of_count: usize,
+) -> Option<SmallVec<[Observation; INLINE_POINTS]>> {
+    if of_count < CHECKED_FROM || are_alike(observations, BOLD_SIGMA_RATIO) {
+        return None;
+    }
+    let mut sigmas: SmallVec<[f64; INLINE_POINTS]> =
+        observations.iter().map(|seen| seen.sigma_px).collect();
+    sigmas.sort_unstable_by(f64::total_cmp);
+    let floor_px = sigmas.get(of_count - 1)? / BOLD_SIGMA_RATIO;
+    (sigmas[0] < floor_px).then(|| {
+        observations
+            .iter()
+            .map(|seen| Observation {
+                sigma_px: seen.sigma_px.max(floor_px),
+                ..*seen
+            })
+            .collect()
+    })
+}
+
+/// Returns whether no sigma is more than `ratio` times another: nearly always.
+fn are_alike(observations: &[Observation], ratio: f64) -> bool {
     let (mut least, mut largest) = ([f64::INFINITY; 4], [0.0_f64; 4]);
     let (fours, rest) = observations.as_chunks::<4>();
     let mut look = |lane: usize, seen: &Observation| {
@@ -276,10 +367,14 @@ fn count_checking(observations: &[Observation]) -> usize {
         look(0, seen);
     }
     let least = least.into_iter().fold(f64::INFINITY, f64::min);
-    if largest
-        .iter()
-        .all(|sigma| *sigma <= WEAK_SIGMA_RATIO * least)
-    {
+    largest.iter().all(|sigma| *sigma <= ratio * least)
+}
+
+/// Returns how many points are precise enough to check others: those whose sigma is at most
+/// [`WEAK_SIGMA_RATIO`] times that of the third best. Any three fix a pose; what is much weaker than
+/// they are could not contradict them, so it gives no redundancy.
+fn count_checking(observations: &[Observation]) -> usize {
+    if are_alike(observations, WEAK_SIGMA_RATIO) {
         return observations.len();
     }
     let mut best = [f64::INFINITY; 3];
@@ -293,26 +388,6 @@ fn count_checking(observations: &[Observation]) -> usize {
         .iter()
         .filter(|seen| seen.sigma_px <= WEAK_SIGMA_RATIO * best[2])
         .count()
-}
-
-/// Indices of the points that may be left out: all of a few, of many those that fit worst.
-fn suspects(camera: &Camera, observations: &[Observation], of_all: Option<&Solution>) -> Suspects {
-    let mut all: SmallVec<[(f64, usize); INLINE_POINTS]> = observations
-        .iter()
-        .enumerate()
-        .map(|(index, seen)| {
-            let residual = of_all.and_then(|solution| solution.residual_px(camera, seen));
-            (
-                residual.map_or(f64::INFINITY, |r| r.norm() / seen.sigma_px),
-                index,
-            )
-        })
-        .collect();
-    all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    all.truncate(exclude::max_suspects(observations.len()));
-    let mut suspects: Suspects = all.into_iter().map(|(_, index)| index).collect();
-    suspects.sort_unstable();
-    suspects
 }
 
 fn dlt_seed(

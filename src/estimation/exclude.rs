@@ -43,6 +43,9 @@ pub(crate) struct Judge<S, P> {
     pub(crate) prior_cost: P,
     /// Points that must remain.
     pub(crate) min_remaining: usize,
+    /// Whether what the prior excludes is excluded. If the prior may be wrong itself, such poses are not
+    /// chosen, but they still are rivals.
+    pub(crate) is_prior_sure: bool,
 }
 
 impl<S, P> Judge<S, P>
@@ -51,9 +54,9 @@ where
     P: Fn(&Solution) -> f64,
 {
     fn trusted(&self, observations: &[Observation]) -> Option<Solution> {
-        (self.solve)(observations)
-            .ok()
-            .filter(|solution| solution.is_trusted() && self.cost(solution).is_finite())
+        (self.solve)(observations).ok().filter(|solution| {
+            solution.is_trusted() && (!self.is_prior_sure || self.cost(solution).is_finite())
+        })
     }
 
     fn cost(&self, solution: &Solution) -> f64 {
@@ -79,7 +82,7 @@ where
     let mut scratch = Subset::new();
     if max_outliers >= 1 && spare >= 1 {
         let singles = suspects.iter().map(|&i| [i, i]);
-        let solution = best(judge, observations, &mut scratch, singles);
+        let solution = best(judge, observations, &mut scratch, singles, None);
         if solution.is_some() {
             return solution;
         }
@@ -104,30 +107,29 @@ where
             let solution = judge.trusted(&scratch)?;
             Some((judge.cost(&solution), pair))
         })
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((_, pair)) = exchange {
-        let without_pair = best(judge, observations, &mut scratch, std::iter::once(pair));
-        if without_pair.is_some() {
-            return without_pair;
-        }
-    }
-    best(judge, observations, &mut scratch, pairs())
+        .filter(|(cost, _)| cost.is_finite())
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, pair)| pair);
+    best(judge, observations, &mut scratch, pairs(), exchange)
 }
 
 /// A hypothesis that passed.
 struct Passed {
     cost: f64,
+    chi_squared: f64,
     left_out: [usize; 2],
     camera_from_tanker: Isometry3<f64>,
 }
 
-/// The trusted solution with the least cost among those that leave out one of these pairs
-/// (the same index twice: one point). Another one that says something else is its rival.
+/// The trusted solution with the least cost among those that leave out one of these pairs (the same index
+/// twice: one point), or the preferred one if it is trusted. Another one that says something else is its
+/// rival; how likely that is, is the image's to say.
 fn best<S, P>(
     judge: &Judge<S, P>,
     observations: &[Observation],
     scratch: &mut Subset,
     hypotheses: impl Iterator<Item = [usize; 2]>,
+    preferred: Option<[usize; 2]>,
 ) -> Option<Solution>
 where
     S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
@@ -147,12 +149,16 @@ where
             let solution = solve(left_out)?;
             Some(Passed {
                 cost: judge.cost(&solution),
+                chi_squared: solution.chi_squared,
                 left_out,
                 camera_from_tanker: solution.camera_from_tanker,
             })
         })
         .collect();
-    let first = passed.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let plausible = || passed.iter().filter(|passed| passed.cost.is_finite());
+    let first = plausible()
+        .find(|passed| Some(passed.left_out) == preferred)
+        .or_else(|| plausible().min_by(|a, b| a.cost.total_cmp(&b.cost)))?;
     // Solved once more: cheaper than to keep every solution.
     let [i, j] = first.left_out;
     let mut best = solve(first.left_out)?;
@@ -161,9 +167,9 @@ where
     let rival = passed
         .iter()
         .filter(|other| is_elsewhere(&best, &other.camera_from_tanker))
-        .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
     if let Some(rival) = rival {
-        let ratio = likelihood_ratio(rival.cost, first.cost);
+        let ratio = likelihood_ratio(rival.chi_squared, first.chi_squared);
         best.ambiguity = best.ambiguity.max(ratio);
     }
     Some(best)

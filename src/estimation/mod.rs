@@ -87,7 +87,8 @@ pub struct EstimatorSettings {
     /// Rotation part of the expected `camera_from_tanker`.
     pub nominal_camera_from_tanker: Rotation3<f64>,
     /// Fewer points give no pose, nor do fewer whose sigma is at most five times that of the third
-    /// best; the initialisation may need more.
+    /// best; the initialisation may need more. From 5 on no sigma counts as less than half of that of the
+    /// point at this place, best first.
     pub min_points: usize,
     /// At most this many points may be excluded as wrong, 0 to 2.
     pub max_outliers: usize,
@@ -125,6 +126,26 @@ pub struct Observation {
     pub sigma_px: f64,
 }
 
+impl Observation {
+    /// Returns predicted minus seen pixel, px; none where the marker has no pixel at this pose.
+    #[must_use]
+    pub fn residual_px(
+        &self,
+        camera: &Camera,
+        camera_from_tanker: &Isometry3<f64>,
+    ) -> Option<Vector2<f64>> {
+        let q = camera_from_tanker * self.marker_in_tanker;
+        if q.z <= 0.0 {
+            return None;
+        }
+        let (pixel, _) = camera.project(Ray {
+            x: q.x / q.z,
+            y: q.y / q.z,
+        })?;
+        Some(Vector2::new(pixel.u - self.pixel.u, pixel.v - self.pixel.v))
+    }
+}
+
 /// A pose with all that is needed to judge it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
@@ -155,15 +176,7 @@ impl Solution {
     /// Returns predicted minus seen pixel, px; none where the marker has no pixel at this pose.
     #[must_use]
     pub fn residual_px(&self, camera: &Camera, seen: &Observation) -> Option<Vector2<f64>> {
-        let q = self.camera_from_tanker * seen.marker_in_tanker;
-        if q.z <= 0.0 {
-            return None;
-        }
-        let (pixel, _) = camera.project(Ray {
-            x: q.x / q.z,
-            y: q.y / q.z,
-        })?;
-        Some(Vector2::new(pixel.u - seen.pixel.u, pixel.v - seen.pixel.v))
+        seen.residual_px(camera, &self.camera_from_tanker)
     }
 
     /// Returns whether the residuals are as small as the sigmas promise.

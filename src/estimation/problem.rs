@@ -155,10 +155,7 @@ impl<'a> Problem<'a> {
 
     /// Returns the final pose from a minimum of the cost, every point in front of the camera.
     pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
-        let start = CentredPose {
-            rotation: *rotation,
-            centre_in_camera: self.cost.centre_in_camera(rotation),
-        };
+        let start = self.placed(rotation);
         let fit = match self.refinement {
             Refinement::None => self.as_it_is(start),
             Refinement::MaximumLikelihood if self.camera.is_pinhole() => vectorised(PinholeFit {
@@ -174,6 +171,15 @@ impl<'a> Problem<'a> {
             self.check_in_front(&fit.pose)?;
         }
         fit
+    }
+
+    /// Returns the pose with this rotation that suits the points best.
+    #[inline]
+    pub(crate) fn placed(&self, rotation: &Rotation3<f64>) -> CentredPose {
+        CentredPose {
+            rotation: *rotation,
+            centre_in_camera: self.cost.centre_in_camera(rotation),
+        }
     }
 
     /// The paper's own estimate, with the covariance that it really has.
@@ -200,12 +206,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns `camera_from_tanker` of a fit.
-    pub(crate) fn pose(&self, fit: &Fit) -> Isometry3<f64> {
-        let t = fit.pose.centre_in_camera - fit.pose.rotation * self.points.mean.coords;
+    /// Returns `camera_from_tanker` of a pose about the markers' mean.
+    pub(crate) fn pose(&self, pose: &CentredPose) -> Isometry3<f64> {
+        let t = pose.centre_in_camera - pose.rotation * self.points.mean.coords;
         Isometry3::from_parts(
             Translation3::from(t),
-            UnitQuaternion::from_rotation_matrix(&fit.pose.rotation),
+            UnitQuaternion::from_rotation_matrix(&pose.rotation),
         )
     }
 
@@ -217,11 +223,23 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns what the cost is to be divided by to rise as chi-squared does near a pose, m²; none for the
-    /// paper's cost, which is not weighted by the noise.
-    pub(crate) fn scale_of_cost(&self, pose: &CentredPose) -> Option<f64> {
-        (self.refinement == Refinement::MaximumLikelihood)
-            .then_some(pose.centre_in_camera.z * pose.centre_in_camera.z)
+    /// Returns by how much chi-squared rises when a fit is turned to another attitude, at the position that
+    /// suits it best; none where a point has no pixel there.
+    pub(crate) fn rise(&self, fit: &Fit, rotation: &Rotation3<f64>) -> Option<f64> {
+        let rise = match self.refinement {
+            // The cost is chi-squared times squared depths, to first order.
+            Refinement::MaximumLikelihood => {
+                let depth = fit.pose.centre_in_camera.z;
+                let cost = |rotation| self.cost.value(Plain, rotation);
+                (cost(rotation) - cost(&fit.pose.rotation)) / (depth * depth)
+            }
+            // The paper's cost knows nothing of the noise.
+            Refinement::None => {
+                let there = self.placed(rotation);
+                refine::squared_residuals(&self.lens_residuals(), &there)?.0 - fit.chi_squared
+            }
+        };
+        Some(rise.max(0.0))
     }
 
     /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; none for the

@@ -16,7 +16,8 @@ pub(crate) const MAX_ITERATIONS: u16 = 50;
 const GAIN_TOLERANCE: f64 = 1e-6;
 /// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
-/// rad, and share of the distance; a shorter step leaves the standard deviations as they are, to a thousandth.
+/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 3e-4 of
+/// themselves for the shipped maps, to 2 % for a flat target seen face on.
 const NEAR: f64 = 1e-3;
 /// Damping at which no step in any direction helps any more.
 const MAX_DAMPING: f64 = 1e9;
@@ -151,7 +152,7 @@ fn dot(a: &Vector, b: &Vector) -> f64 {
 }
 
 impl CentredPose {
-    /// Returns whether a step changes the standard deviations by no more than about a thousandth.
+    /// Returns whether a step leaves the information as it is, to what [`NEAR`] says.
     #[inline(always)]
     fn is_near(&self, step: &Vector) -> bool {
         let turn = Vector3::new(step[0], step[1], step[2]).norm_squared();

@@ -8,7 +8,6 @@
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
 use super::ambiguity::mirror_image;
-use super::four::Plain;
 use super::problem::Problem;
 use super::refine::Fit;
 
@@ -35,15 +34,15 @@ pub(crate) fn widened(problem: &Problem, fit: &Fit) -> Matrix6<f64> {
 #[cold]
 fn flattest(problem: &Problem, fit: &Fit, attitude: &Matrix3<f64>) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
-    let depth = problem.scale_of_cost(pose)?;
     let information = attitude.try_inverse()?;
     let turn = (mirror_image(problem, pose)? * pose.rotation.inverse()).scaled_axis();
-    let here = problem.cost.value(Plain, &pose.rotation);
     let mut worst: Option<(f64, Vector3<f64>)> = None;
     for share in WAY {
         let step = turn * share;
         let there = Rotation3::new(step) * pose.rotation;
-        let rise = ((problem.cost.value(Plain, &there) - here) / depth).max(0.0);
+        let Some(rise) = problem.rise(fit, &there) else {
+            continue;
+        };
         let promised = step.dot(&(information * step));
         if rise < IMPLAUSIBLE && promised > STEEPNESS * rise + SLACK {
             let factor = promised / (rise + 1.0);

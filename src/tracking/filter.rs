@@ -52,15 +52,9 @@ pub struct Filter {
     challenger: Option<State>,
 }
 
-/// What a pose does to a track or candidate.
-enum Step {
-    Accepted {
-        state: State,
-        innovation_squared: f64,
-    },
-    Contradicts {
-        innovation_squared: f64,
-    },
+/// Why a pose does not correct a track or candidate.
+enum Refused {
+    Contradicts { innovation_squared: f64 },
     LostPrecision,
 }
 
@@ -198,8 +192,8 @@ impl Filter {
         let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
         let limit = self.checked.gate;
         match self.step(&state, gap_s, &measured) {
-            Step::LostPrecision => self.start(&measured, StartReason::LostPrecision),
-            Step::Contradicts { innovation_squared } if is_confirmed => {
+            Err(Refused::LostPrecision) => self.start(&measured, StartReason::LostPrecision),
+            Err(Refused::Contradicts { innovation_squared }) if is_confirmed => {
                 self.state = Some(state);
                 self.challenge(&measured);
                 if self
@@ -214,17 +208,14 @@ impl Filter {
                     limit,
                 }
             }
-            Step::Contradicts { innovation_squared } => {
+            Err(Refused::Contradicts { innovation_squared }) => {
                 let reason = StartReason::Inconsistent {
                     innovation_squared,
                     limit,
                 };
                 self.start(&measured, reason)
             }
-            Step::Accepted {
-                state,
-                innovation_squared,
-            } => {
+            Ok((state, innovation_squared)) => {
                 self.state = Some(state);
                 self.challenger = None;
                 let needed = self.checked.confirm_frames;
@@ -242,18 +233,21 @@ impl Filter {
         }
     }
 
-    /// Returns what a pose makes of a track or candidate, `gap_s` after its last frame.
-    fn step(&self, state: &State, gap_s: f64, measured: &Measured) -> Step {
+    /// Returns a track or candidate corrected by a pose `gap_s` after its last frame, and the squared innovation.
+    fn step(
+        &self,
+        state: &State,
+        gap_s: f64,
+        measured: &Measured,
+    ) -> Result<(State, f64), Refused> {
         let mut predicted = predict(&state.track.motion, gap_s, self.noise(&state.lag));
         let innovate = |from: &Motion| {
             Innovation::new(from, measured.camera_from_tanker, &measured.covariance)
         };
-        let Some(mut innovation) = innovate(&predicted) else {
-            return Step::LostPrecision;
-        };
+        let mut innovation = innovate(&predicted).ok_or(Refused::LostPrecision)?;
         let innovation_squared = innovation.squared;
         if innovation_squared > self.checked.gate {
-            return Step::Contradicts { innovation_squared };
+            return Err(Refused::Contradicts { innovation_squared });
         }
         let lag = state
             .lag
@@ -265,26 +259,21 @@ impl Filter {
                 MEMORY_FRAMES * gap_s,
                 &self.checked.manoeuvre_noise,
             );
-            let Some(again) = innovate(&predicted) else {
-                return Step::LostPrecision;
-            };
-            innovation = again;
+            innovation = innovate(&predicted).ok_or(Refused::LostPrecision)?;
         }
-        let Some(motion) = innovation.corrected(&predicted) else {
-            return Step::LostPrecision;
-        };
-        Step::Accepted {
-            state: State {
-                track: Track {
-                    stamp_ns: measured.stamp_ns,
-                    motion,
-                },
-                consistent_frames: state.consistent_frames.saturating_add(1),
-                lag,
-                ..*state
+        let motion = innovation
+            .corrected(&predicted)
+            .ok_or(Refused::LostPrecision)?;
+        let corrected = State {
+            track: Track {
+                stamp_ns: measured.stamp_ns,
+                motion,
             },
-            innovation_squared,
-        }
+            consistent_frames: state.consistent_frames.saturating_add(1),
+            lag,
+            ..*state
+        };
+        Ok((corrected, innovation_squared))
     }
 
     /// Takes a pose that the gate has refused for the track that such poses may make.
@@ -293,13 +282,11 @@ impl Filter {
             let Place::Next { gap_s } = self.place(&rival, measured.stamp_ns) else {
                 return None;
             };
-            match self.step(&rival, gap_s, measured) {
-                Step::Accepted { state, .. } => Some(State {
-                    seen_ns: measured.stamp_ns,
-                    ..state
-                }),
-                Step::Contradicts { .. } | Step::LostPrecision => None,
-            }
+            let (state, _) = self.step(&rival, gap_s, measured).ok()?;
+            Some(State {
+                seen_ns: measured.stamp_ns,
+                ..state
+            })
         });
         self.challenger = Some(going_on.unwrap_or_else(|| self.candidate(measured)));
     }
