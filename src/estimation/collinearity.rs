@@ -13,7 +13,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory, totals};
+use super::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory};
 use super::points::{Block, Points};
 use super::symmetric3::{Symmetric3, inverse};
 use crate::camera::Ray;
@@ -151,22 +151,62 @@ impl CollinearityMoments {
     /// Returns the sums over all points.
     #[inline(always)]
     pub(crate) fn new<A: Arithmetic>(arithmetic: A, points: &Points, weighting: Weighting) -> Self {
+        let mut moments = Self {
+            sums: [[0.0; MONOMIALS]; 6],
+        };
         // Without distortion, columns and rows do not mix and differ by a factor only.
         match (weighting, points.row_by_column_information) {
             (Weighting::Image, Some(ratio)) => {
-                let [w11, w13, w23, w33] = sums(arithmetic, points, |block| {
+                moments.sum(arithmetic, points, [0, 2, 4, 5], |block| {
                     let [w11, _, w13, _, w23, w33] = weighting.of(arithmetic, block);
                     [w11, w13, w23, w33]
                 });
-                let zero = [0.0; MONOMIALS];
-                let w22 = w11.map(|sum| sum * ratio);
-                Self {
-                    sums: [w11, zero, w13, w22, w23, w33],
+                for m in 0..MONOMIALS {
+                    moments.sums[3][m] = moments.sums[0][m] * ratio;
                 }
             }
-            _ => Self {
-                sums: sums(arithmetic, points, |block| weighting.of(arithmetic, block)),
-            },
+            _ => moments.sum(arithmetic, points, [0, 1, 2, 3, 4, 5], |block| {
+                weighting.of(arithmetic, block)
+            }),
+        }
+        moments
+    }
+
+    /// Puts `Σ w (1, p, p pᵀ)` over all points in these places, one for each weight.
+    #[inline(always)]
+    fn sum<A: Arithmetic, const N: usize>(
+        &mut self,
+        arithmetic: A,
+        points: &Points,
+        places: [usize; N],
+        weights_of: impl Fn(&Block) -> [Four<A>; N],
+    ) {
+        let mut sums = [[Four::splat(arithmetic, 0.0); MONOMIALS]; N];
+        for block in points.blocks {
+            let weights = weights_of(block);
+            let x = Four::new(arithmetic, block.marker[0]);
+            let y = Four::new(arithmetic, block.marker[1]);
+            let z = Four::new(arithmetic, block.marker[2]);
+            for k in 0..N {
+                let (w, sums) = (weights[k], &mut sums[k]);
+                let (xw, yw, zw) = (x * w, y * w, z * w);
+                sums[0] = sums[0] + w;
+                sums[1] = sums[1] + xw;
+                sums[2] = sums[2] + yw;
+                sums[3] = sums[3] + zw;
+                sums[4] = sums[4].plus(x, xw);
+                sums[5] = sums[5].plus(x, yw);
+                sums[6] = sums[6].plus(x, zw);
+                sums[7] = sums[7].plus(y, yw);
+                sums[8] = sums[8].plus(y, zw);
+                sums[9] = sums[9].plus(z, zw);
+            }
+            keep_in_memory(&mut sums);
+        }
+        for k in 0..N {
+            for m in 0..MONOMIALS {
+                self.sums[places[k]][m] = sums[k][m].total();
+            }
         }
     }
 
@@ -193,42 +233,6 @@ impl CollinearityMoments {
             a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], 0.0, 0.0, 0.0,
         ]
     }
-}
-
-/// Returns `Σ w (1, p, p pᵀ)` for each of some weights.
-#[inline(always)]
-fn sums<A: Arithmetic, const N: usize>(
-    arithmetic: A,
-    points: &Points,
-    weights_of: impl Fn(&Block) -> [Four<A>; N],
-) -> [Monomials; N] {
-    let mut sums = [[Four::splat(arithmetic, 0.0); MONOMIALS]; N];
-    for block in points.blocks {
-        let weights = weights_of(block);
-        let x = Four::new(arithmetic, block.marker[0]);
-        let y = Four::new(arithmetic, block.marker[1]);
-        let z = Four::new(arithmetic, block.marker[2]);
-        for k in 0..N {
-            let (w, sums) = (weights[k], &mut sums[k]);
-            let (xw, yw, zw) = (x * w, y * w, z * w);
-            sums[0] = sums[0] + w;
-            sums[1] = sums[1] + xw;
-            sums[2] = sums[2] + yw;
-            sums[3] = sums[3] + zw;
-            sums[4] = sums[4].plus(x, xw);
-            sums[5] = sums[5].plus(x, yw);
-            sums[6] = sums[6].plus(x, zw);
-            sums[7] = sums[7].plus(y, yw);
-            sums[8] = sums[8].plus(y, zw);
-            sums[9] = sums[9].plus(z, zw);
-        }
-        keep_in_memory(&mut sums);
-    }
-    let mut stored = [[0.0; MONOMIALS]; N];
-    for k in 0..N {
-        stored[k] = totals(&sums[k]);
-    }
-    stored
 }
 
 /// The collinearity error as a function of the rotation alone.

@@ -291,7 +291,10 @@ impl Estimator {
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Solution {
             camera_from_tanker: problem.pose(&fit.pose),
-            covariance: PoseCovariance::from_point(&widened(problem, fit), &lever),
+            covariance: PoseCovariance::from_point(
+                widened(problem, fit).as_ref().unwrap_or(&fit.covariance),
+                &lever,
+            ),
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
             degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),

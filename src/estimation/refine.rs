@@ -134,7 +134,7 @@ fn finish(
     } else {
         1.0
     };
-    if !covariance.iter().all(|value| value.is_finite()) || !chi_squared.is_finite() {
+    if !(chi_squared.is_finite() && covariance.as_slice().iter().all(|value| value.is_finite())) {
         return Err(FitFailure::Singular);
     }
     Ok(Fit {

@@ -21,20 +21,21 @@ const WAY: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const STEEPNESS: f64 = 2.0;
 const SLACK: f64 = 6.0;
 
-/// Returns the covariance of a fit, rotation before position, widened where the error is flatter than its
-/// curvature promises.
-pub(crate) fn widened(problem: &Problem, fit: &Fit) -> Matrix6<f64> {
-    let attitude = upper_left(&fit.covariance);
-    if attitude.trace() < SURE {
-        return fit.covariance;
+/// Returns a wider covariance of a fit, rotation before position, where the error is flatter than its
+/// curvature promises; none where the fit's own is honest.
+#[inline]
+pub(crate) fn widened(problem: &Problem, fit: &Fit) -> Option<Matrix6<f64>> {
+    let c = &fit.covariance;
+    if c.m11 + c.m22 + c.m33 < SURE {
+        return None;
     }
-    flattest(problem, fit, &attitude).unwrap_or(fit.covariance)
+    flattest(problem, fit)
 }
 
 #[cold]
-fn flattest(problem: &Problem, fit: &Fit, attitude: &Matrix3<f64>) -> Option<Matrix6<f64>> {
+fn flattest(problem: &Problem, fit: &Fit) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
-    let information = attitude.try_inverse()?;
+    let information = upper_left(&fit.covariance).try_inverse()?;
     let turn = (mirror_image(problem, pose)? * pose.rotation.inverse()).scaled_axis();
     let mut worst: Option<(f64, Vector3<f64>)> = None;
     for share in WAY {
