@@ -103,23 +103,65 @@ fn an_update_is_the_textbook_one() {
     assert!((corrected.covariance - plain).amax() < 1e-14);
 }
 
-/// One frame: time since the last one, sigmas of position and attitude, a shift in sigmas.
-fn any_frame() -> impl Strategy<Value = (i64, f64, f64, f64)> {
+/// One frame, each length in its unit or in sigmas.
+#[derive(Debug, Clone)]
+struct AnyFrame {
+    after_ns: i64,
+    position_sigma_m: f64,
+    attitude_sigma: f64,
+    /// Of position and attitude, in sigmas.
+    shift: f64,
+    turn: Vector3<f64>,
+    /// From the tanker's origin to the point that was measured.
+    lever_m: Vector3<f64>,
+}
+
+impl AnyFrame {
+    fn covariance(&self) -> PoseCovariance {
+        let mut point = Matrix6::zeros();
+        for axis in 0..3 {
+            point[(axis, axis)] = self.attitude_sigma.powi(2);
+            point[(3 + axis, 3 + axis)] = self.position_sigma_m.powi(2);
+        }
+        PoseCovariance::from_point(&point, &self.lever_m)
+    }
+
+    fn pose(&self) -> Isometry3<f64> {
+        let mut pose = pose(self.shift * self.position_sigma_m);
+        let turn = self.turn * self.attitude_sigma.min(1.0);
+        pose.rotation = UnitQuaternion::from_scaled_axis(turn) * pose.rotation;
+        pose
+    }
+}
+
+fn any_frame() -> impl Strategy<Value = AnyFrame> {
     let exponent = |low: f64, high: f64| (low..high).prop_map(|x| 10.0_f64.powf(x));
+    let vector = || [-1.0..1.0, -1.0..1.0, -1.0..1.0_f64].prop_map(Vector3::from);
+    #[allow(clippy::cast_possible_truncation)] // below 6e10
+    let after_ns = exponent(0.0, 10.77).prop_map(|ns| ns as i64);
     (
-        exponent(0.0, 10.77).prop_map(|ns| {
-            #[allow(clippy::cast_possible_truncation)] // below 6e10
-            let ns = ns as i64;
-            ns
-        }),
+        after_ns,
         exponent(-9.0, 3.0),
         exponent(-9.0, 0.5),
         -3.0..3.0,
+        vector(),
+        vector(),
+        exponent(-3.0, 3.0),
     )
+        .prop_map(
+            |(after_ns, position_sigma_m, attitude_sigma, shift, turn, arm, length_m)| AnyFrame {
+                after_ns,
+                position_sigma_m,
+                attitude_sigma,
+                shift,
+                turn,
+                lever_m: arm * length_m,
+            },
+        )
 }
 
 proptest! {
-    /// Gaps of a nanosecond to a minute, sigmas of a nanometre to a kilometre, in any order.
+    /// Gaps of a nanosecond to a minute, sigmas of a nanometre to a kilometre, levers of up to one, in any order.
     #[test]
     fn the_covariance_stays_positive_definite(
         frames in prop::collection::vec(any_frame(), 300),
@@ -135,14 +177,9 @@ proptest! {
             ..Default::default()
         }).expect("in range");
         let mut stamp_ns = EPOCH_NS;
-        for (after_ns, position_sigma_m, attitude_sigma, shift) in frames {
-            stamp_ns += after_ns;
-            let diagonal = Vector3::repeat(position_sigma_m.powi(2))
-                .push(attitude_sigma.powi(2))
-                .push(attitude_sigma.powi(2))
-                .push(attitude_sigma.powi(2));
-            let measured = PoseCovariance(Matrix6::from_diagonal(&diagonal));
-            let outcome = filter.update(stamp_ns, &pose(shift * position_sigma_m), &measured);
+        for frame in frames {
+            stamp_ns += frame.after_ns;
+            let outcome = filter.update(stamp_ns, &frame.pose(), &frame.covariance());
             prop_assert!(
                 outcome != TrackOutcome::Started(StartReason::LostPrecision),
                 "lost precision"
