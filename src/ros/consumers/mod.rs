@@ -20,7 +20,7 @@ use crate::ros::convert;
 use crate::ros::diagnostics::Tally;
 use crate::ros::messages::{
     DiagnosticStatus, FiducialMarkerPosReport, Header, KeyValue, LandingTarget, LandingTargetPose,
-    PoseStamped, ReceptacleState,
+    Message, PoseStamped, ReceptacleState,
 };
 use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, QosProfile, RosNode, reliable};
@@ -125,6 +125,22 @@ impl Consumers {
             mavros_pose: Told::open(ros, on.mavros_pose, MAVROS_POSE)?,
             configuration: on,
         }))
+    }
+
+    /// Takes the setup as it is now, with the mount as it is now: a lever arm of yesterday would give a wrong
+    /// place that looks right. Attitudes and counts begin anew, as all does that a clean-up forgets.
+    pub fn configure(&mut self, configuration: &ConsumerConfiguration, setup: RefuellingSetup) {
+        self.setup = setup;
+        self.on_configuration(configuration);
+        self.attitudes.clear();
+        self.resets = None;
+        self.bad_attitude = SaidOnce::default();
+        self.last_bad_attitude = None;
+        begin_anew(&mut self.receptacle);
+        begin_anew(&mut self.px4_landing_target);
+        begin_anew(&mut self.px4_fiducial_marker);
+        begin_anew(&mut self.mavros_landing_target);
+        begin_anew(&mut self.mavros_pose);
     }
 
     /// Takes changed parameters: of these only the camera's mount can change.
@@ -278,5 +294,11 @@ impl Consumers {
             rate_in_b: found.rate_in_body,
             rate_covariance: self.configuration.attitude_rate_covariance,
         })
+    }
+}
+
+fn begin_anew<M: Message>(told: &mut Option<Told<M>>) {
+    if let Some(told) = told {
+        told.begin_anew();
     }
 }
