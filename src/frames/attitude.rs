@@ -9,6 +9,11 @@ const KEPT: usize = 1000;
 /// rad/s; no aircraft turns faster, but an estimator that resets its heading does.
 const FASTEST_RADPS: f64 = 10.0;
 
+/// s; images are answered a few tenths of a second late at most, so the newest attitude is little later than they
+/// are. One that is further ahead has a stamp of another clock, and the attitude between older samples would be
+/// that of another time.
+const FARTHEST_AHEAD_S: f64 = 1.0;
+
 /// Attitude and rate of a body against local axes at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeAt {
@@ -33,6 +38,16 @@ pub enum AttitudeError {
     Stale {
         /// s.
         age_s: f64,
+        /// s.
+        limit_s: f64,
+    },
+    /// The newest sample is so much later than the image that their clocks hardly agree.
+    #[error(
+        "the newest attitude of the receiver is {by_s:.3} s later than the image, allowed is {limit_s} s: the clocks do not agree, or the image comes late"
+    )]
+    Ahead {
+        /// s.
+        by_s: f64,
         /// s.
         limit_s: f64,
     },
@@ -104,6 +119,9 @@ impl AttitudeHistory {
     /// Returns the attitude at a stamp: between two samples, or a little after the last one at the rate of
     /// the last two.
     ///
+    /// An error of the stamps that is smaller than the limits cannot be noticed here: it turns the attitude by as
+    /// much as the body turns in that time.
+    ///
     /// # Errors
     /// [`AttitudeError`] says what is missing; nothing is ever taken from a sample further away.
     pub fn at(&self, stamp_ns: i64) -> Result<AttitudeAt, AttitudeError> {
@@ -114,6 +132,11 @@ impl AttitudeHistory {
         let (Some(first), Some(last)) = (self.samples.front(), self.samples.back()) else {
             return Err(AttitudeError::TooFew { got });
         };
+        let by_s = seconds(last.0, stamp_ns);
+        if by_s > FARTHEST_AHEAD_S {
+            let limit_s = FARTHEST_AHEAD_S;
+            return Err(AttitudeError::Ahead { by_s, limit_s });
+        }
         if later == 0 && first.0 != stamp_ns {
             return Err(AttitudeError::BeforeFirst {
                 by_s: seconds(first.0, stamp_ns),
@@ -212,6 +235,45 @@ mod tests {
             sparse.at(271 * MS),
             Err(AttitudeError::Stale { .. })
         ));
+    }
+
+    /// The attitude for an image of a tenth of a second ago, from samples at 50 Hz with the stamps of a clock that
+    /// shows `offset_ms` more than that of the images.
+    fn with_a_clock_ahead_by(offset_ms: i64) -> Result<AttitudeAt, AttitudeError> {
+        let mut history = AttitudeHistory::new(LIMIT_S);
+        for stamp in (0..=2000).step_by(20) {
+            history.push((stamp + offset_ms) * MS, turning(stamp * MS));
+        }
+        history.at(1900 * MS)
+    }
+
+    #[test]
+    fn a_clock_that_is_far_off_gives_nothing_in_either_direction() {
+        assert!(with_a_clock_ahead_by(0).is_ok());
+        for offset_ms in [901, 1500, 100_000] {
+            let found = with_a_clock_ahead_by(offset_ms);
+            let Err(AttitudeError::Ahead { by_s, .. }) = found else {
+                panic!("{offset_ms} ms: {found:?}");
+            };
+            assert!((by_s - (offset_ms as f64 * 1e-3 + 0.1)).abs() < ROUNDING);
+        }
+        for offset_ms in [-151, -1500, -100_000] {
+            let found = with_a_clock_ahead_by(offset_ms);
+            assert!(
+                matches!(found, Err(AttitudeError::Stale { .. })),
+                "{offset_ms} ms: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_a_little_off_turns_the_attitude_by_rate_times_offset() {
+        for offset_ms in [-150, 900] {
+            let found = with_a_clock_ahead_by(offset_ms).expect("within the limits");
+            let error = found.local_from_body.inverse() * turning(1900 * MS);
+            let expected = rate() * (offset_ms as f64 * 1e-3);
+            assert!((error.scaled_axis() - expected).norm() < ROUNDING);
+        }
     }
 
     #[test]
