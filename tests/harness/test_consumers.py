@@ -46,9 +46,18 @@ ATTITUDES: dict[str, tuple[type, str, Callable[[Truth], Any]]] = {
 }
 
 
-def all_on(attitude: str) -> list[str]:
+# These two exclude each other, so a flight has one of them.
+PX4_OUTPUTS = ("px4_landing_target", "px4_fiducial_marker")
+
+
+def outputs_with(px4: str) -> list[str]:
+    """All outputs but the other one for PX4."""
+    return [name for name in TOPICS if name == px4 or name not in PX4_OUTPUTS]
+
+
+def all_on(attitude: str, px4: str) -> list[str]:
     arguments = ["-p", f"refuelling:={SETUP}", "-p", f"attitude:={attitude}"]
-    for name in TOPICS:
+    for name in outputs_with(px4):
         arguments += ["-p", f"publish_{name}:=true"]
     return arguments
 
@@ -70,18 +79,20 @@ class Flight:
         start: StartEstimator,
         rng: np.random.Generator,
         attitude: str = "px4",
+        px4: str = "px4_landing_target",
         *more: str,
     ) -> None:
         self.peer = peer
         self.rng = rng
-        self.heard = {name: peer.collect(*topic) for name, topic in TOPICS.items()}
+        self.outputs = outputs_with(px4)
+        self.heard = {name: peer.collect(*TOPICS[name]) for name in self.outputs}
         self.diagnostics: list[DiagnosticArray] = peer.collect(DiagnosticArray, "/diagnostics")
         message_type, topic, self._tell = ATTITUDES[attitude]
         self._attitudes = peer.node.create_publisher(message_type, topic, BEST_EFFORT)
         self._attitude_topic = topic
         self._told = itertools.count(-50 * STRIDE)
         self._next_attitude = next(self._told)
-        self.estimator: Estimator = start(*all_on(attitude), *more)
+        self.estimator: Estimator = start(*all_on(attitude, px4), *more)
         self.estimator.use_camera()
 
     def tell_attitudes(self, up_to: int) -> None:
@@ -151,11 +162,11 @@ def vector(v: Any) -> list[float]:
     return [v.x, v.y, v.z]
 
 
-@pytest.mark.parametrize("attitude", ATTITUDES)
+@pytest.mark.parametrize("attitude, px4", [*zip(ATTITUDES, PX4_OUTPUTS, strict=True)])
 def test_a_whole_approach_is_taken_by_every_sink_and_true(
-    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator, attitude: str
+    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator, attitude: str, px4: str
 ) -> None:
-    flight = Flight(peer, start_estimator, rng, attitude)
+    flight = Flight(peer, start_estimator, rng, attitude, px4)
     flight.warm_up()
 
     good = flight.fly()
@@ -169,6 +180,8 @@ def test_a_whole_approach_is_taken_by_every_sink_and_true(
         "mavros_pose": mavros_pose,
     }
     for name, rule in rules.items():
+        if name not in flight.outputs:
+            continue
         told = flight.messages_of(name, good)
         missing = set(good) - set(told)
         if name == "px4_landing_target":
@@ -178,24 +191,23 @@ def test_a_whole_approach_is_taken_by_every_sink_and_true(
             # PX4's clock when it reads the message, 20 ms after the image.
             assert rule(message, Truth(index).stamp_us + 20_000) == [], (name, index)
 
-    for index, message in flight.messages_of("px4_fiducial_marker", good).items():
+    if px4 == "px4_landing_target":
+        for index, message in flight.messages_of("px4_landing_target", good).items():
+            truth = Truth(index)
+            m = message
+            of_position = [m.cov_x_rel, m.cov_y_rel, m.cov_z_rel]
+            of_velocity = [m.cov_vx_rel, m.cov_vy_rel, m.cov_vz_rel]
+            within([m.x_rel, m.y_rel, m.z_rel], truth.in_ned, of_position)
+            within([m.vx_rel, m.vy_rel, m.vz_rel], truth.rate_of("in_ned"), of_velocity)
+        return
+    reports = flight.messages_of("px4_fiducial_marker", good)
+    for index, message in reports.items():
         truth = Truth(index)
         w, x, y, z = (float(q) for q in message.q)
         assert np.linalg.norm(log(from_quaternion(x, y, z, w) @ truth.ned_from_frd.T)) < 1e-5
         within(message.rel_pos, truth.in_frd, message.cov_rel_pos)
-    for index, message in flight.messages_of("px4_landing_target", good).items():
-        truth = Truth(index)
-        m = message
-        within([m.x_rel, m.y_rel, m.z_rel], truth.in_ned, [m.cov_x_rel, m.cov_y_rel, m.cov_z_rel])
-        within(
-            [m.vx_rel, m.vy_rel, m.vz_rel],
-            truth.rate_of("in_ned"),
-            [m.cov_vx_rel, m.cov_vy_rel, m.cov_vz_rel],
-        )
-    variances = {
-        index: message.cov_rel_pos
-        for index, message in flight.messages_of("px4_fiducial_marker", good).items()
-    }
+    # MAVROS's messages bring no variances.
+    variances = {index: message.cov_rel_pos for index, message in reports.items()}
     for index, message in flight.messages_of("mavros_landing_target", good).items():
         position, rotation = sinks.through_mavros(message.pose)
         within(position, Truth(index).in_frd, variances[index])
@@ -309,14 +321,17 @@ FAULTS: dict[str, list[tuple[str, Callable[[Any], None]]]] = {
 }
 
 
+@pytest.mark.parametrize("px4", PX4_OUTPUTS)
 def test_the_sinks_refuse_every_seeded_fault(
-    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator
+    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator, px4: str
 ) -> None:
-    flight = Flight(peer, start_estimator, rng)
+    flight = Flight(peer, start_estimator, rng, "px4", px4)
     flight.warm_up()
     good = flight.fly(10)
     now_us = Truth(good[-1]).stamp_us + 20_000
     for name, faults in FAULTS.items():
+        if name not in flight.outputs:
+            continue
         message = flight.messages_of(name, good)[good[-1]]
 
         def refused(message: Any, name: str = name) -> list[str]:
@@ -334,13 +349,14 @@ def test_the_sinks_refuse_every_seeded_fault(
     assert twice(pose, now_us), "the same stamp again"
 
 
+@pytest.mark.parametrize("px4", PX4_OUTPUTS)
 def test_without_the_attitude_of_the_image_nothing_in_ned_is_told_and_the_reason_is(
-    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator
+    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator, px4: str
 ) -> None:
-    flight = Flight(peer, start_estimator, rng)
+    flight = Flight(peer, start_estimator, rng, "px4", px4)
     flight.warm_up()
     good = flight.fly(10)
-    before = {name: len(flight.messages_of(name, good)) for name in TOPICS}
+    before = {name: len(flight.messages_of(name, good)) for name in flight.outputs}
 
     # The attitude falls silent; half a second later it is too old.
     later = range((10 + 7) * STRIDE, (10 + 27) * STRIDE, STRIDE)
@@ -351,7 +367,7 @@ def test_without_the_attitude_of_the_image_nothing_in_ned_is_told_and_the_reason
     told = flight.messages_of("mavros_landing_target", good_later)
     assert set(told) == set(good_later), "BODY_FRD needs no attitude"
     stamps = {Truth(index).stamp_us for index in good_later}
-    for name in ("px4_landing_target", "px4_fiducial_marker", "mavros_pose"):
+    for name in (px4, "mavros_pose"):
         assert not [m for m in flight.heard[name] if stamp_us(m) in stamps], name
         assert before[name] > 0
     peer.spin_until(
@@ -408,6 +424,17 @@ def test_nothing_of_it_is_opened_unless_asked_for(
         ),
         (["publish_receptacle:=true", "refuelling:=nowhere.yaml"], "cannot read"),
         (
+            ["publish_receptacle:=true", f"refuelling:={SETUP}", "track:=false"],
+            "publish_receptacle comes from the track",
+        ),
+        (
+            [
+                *("publish_px4_landing_target:=true", "publish_px4_fiducial_marker:=true"),
+                *(f"refuelling:={SETUP}", "attitude:=px4"),
+            ],
+            "publish_px4_landing_target and publish_px4_fiducial_marker exclude each other",
+        ),
+        (
             [
                 "publish_receptacle:=true",
                 f"refuelling:={REPOSITORY / 'config' / 'tankers' / 'paper.yaml'}",
@@ -416,7 +443,7 @@ def test_nothing_of_it_is_opened_unless_asked_for(
         ),
     ],
 )
-def test_an_output_that_lacks_what_it_needs_stops_the_node_at_once(
+def test_outputs_that_cannot_be_stop_the_node_at_once(
     start_node: StartNode, arguments: list[str], said: str
 ) -> None:
     node = start_node(*[word for argument in arguments for word in ("-p", argument)])

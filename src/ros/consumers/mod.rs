@@ -9,7 +9,7 @@ mod told;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::config::{ConsumerConfiguration, MissingForOutput};
+use crate::config::{ConsumerConfiguration, OutputError};
 use crate::estimation::Solution;
 use crate::frames::{AttitudeHistory, LocalAttitude, PoseEstimate};
 use crate::geometry::Motion;
@@ -44,9 +44,9 @@ pub(super) const QOS: QosProfile = reliable(10);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsumersError {
-    /// A parameter that an output needs.
+    /// Parameters that do not go together.
     #[error(transparent)]
-    Missing(#[from] MissingForOutput),
+    Outputs(#[from] OutputError),
     /// The setup's file.
     #[error("parameter \"refuelling\": cannot read {path:?}: {source}")]
     Unreadable {
