@@ -255,7 +255,7 @@ pub const TABLE: &[ParameterSpec] = &[
     ),
     output(
         "publish_mavros_pose",
-        "publish /mavros/landing_target/pose from single frames, ENU; needs attitude",
+        "publish /mavros/landing_target/pose from single frames, ENU, for consumers of your own: never for PX4; needs attitude",
     ),
     ParameterSpec {
         name: "attitude",
@@ -448,7 +448,7 @@ pub const TABLE: &[ParameterSpec] = &[
         name: "lifecycle",
         kind: Kind::Bool { default: false },
         read_only: true,
-        description: "be a managed node: it loads the marker map and opens its topics when it is configured, \
+        description: "be a managed node: it loads marker map and refuelling file and opens its topics when it is configured, \
                       and answers detections while it is active",
     },
     ParameterSpec {

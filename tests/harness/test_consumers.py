@@ -347,6 +347,8 @@ def test_the_sinks_refuse_every_seeded_fault(
     pose = flight.messages_of("mavros_pose", good)[good[-1]]
     assert twice(pose, now_us) == []
     assert twice(pose, now_us), "the same stamp again"
+    for mav_frame in (sinks.LOCAL_NED, 8, 12, 20):
+        assert sinks.MavrosPose(mav_frame)(pose, now_us), f"through MAVROS as frame {mav_frame}"
 
 
 @pytest.mark.parametrize("px4", PX4_OUTPUTS)

@@ -34,7 +34,8 @@ pub const PX4_LANDING_TARGET: &str = "/fmu/in/landing_target_pose";
 pub const PX4_FIDUCIAL_MARKER: &str = "/fmu/in/fiducial_marker_pos_report";
 /// MAVROS's landing target (its parameter `listen_lt`).
 pub const MAVROS_LANDING_TARGET: &str = "/mavros/landing_target/raw";
-/// MAVROS's landing target as a pose.
+/// The receptacle as a pose in ENU, under MAVROS's name for a landing target: for consumers of ENU. What MAVROS makes
+/// of it, no autopilot may have: PX4 takes it as an absolute place.
 pub const MAVROS_POSE: &str = "/mavros/landing_target/pose";
 
 /// Reliable, so that MAVROS hears it; PX4's bridge, which asks for best effort, does too.

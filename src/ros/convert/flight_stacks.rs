@@ -46,7 +46,8 @@ pub enum FlightStackError {
 
 /// Returns PX4's landing target of the track: receptacle against receiver, NED.
 ///
-/// The target moves, so it is never static and its velocity never the vehicle's own.
+/// The target moves, so it is never static and its velocity never the vehicle's own. There is no absolute position;
+/// `abs_pos_valid` says so, which not every reader in PX4 looks at.
 ///
 /// # Errors
 /// [`FlightStackError`]: what PX4 would reject is not sent.
@@ -91,7 +92,8 @@ pub fn px4_landing_target(
 
 /// Returns PX4's marker report of one frame: receptacle against receiver, FRD, with the attitude beside it.
 ///
-/// PX4 takes that attitude for exact, so the position's variances hold its error too.
+/// For a PX4 whose vision target estimator is built for moving targets (`CONFIG_VTEST_MOVING=y`): one for static targets
+/// would let EKF2 take the tanker's velocity for the vehicle's own. It takes that attitude for exact, so the position's variances hold its error too.
 ///
 /// # Errors
 /// [`FlightStackError`]: what PX4 would reject is not sent.
@@ -153,7 +155,9 @@ pub fn mavros_landing_target(
     })
 }
 
-/// Returns the receptacle in ENU axes about the receiver's origin, for MAVROS to turn into NED.
+/// Returns the receptacle in ENU axes about the receiver's origin.
+///
+/// For consumers of ENU, not for an autopilot: `MAVROS` would call it `LOCAL_NED`, which PX4 takes as an absolute place.
 ///
 /// # Errors
 /// [`FlightStackError::Position`] for what is not finite.
