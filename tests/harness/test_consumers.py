@@ -420,6 +420,48 @@ def test_an_attitude_that_is_none_is_not_used(
     assert "length 0" in flight.estimator.process.log
 
 
+def test_an_attitude_that_px4_has_reset_is_never_mixed_with_the_one_before(
+    peer: Peer, start_estimator: StartEstimator, rng: np.random.Generator
+) -> None:
+    flight = Flight(peer, start_estimator, rng)
+    flight.warm_up()
+    good = flight.fly(10)
+    flight.messages_of("mavros_pose", good)
+    # Ten degrees in 20 ms are 8.7 rad/s: the counter has to tell that this is no turn.
+    heading = about_z(np.radians(10.0))
+    first = flight._next_attitude
+
+    def tell(*indices: int) -> None:
+        for index in indices:
+            flight._attitudes.publish(Truth(index).vehicle_attitude_with(heading, resets=1))
+
+    def silent(index: int) -> bool:
+        assert flight.frame(index).outcome == "OK"
+        flight.messages_of("mavros_landing_target", [index])
+        stamp = Truth(index).stamp_us
+        return not [m for m in flight.heard["mavros_pose"] if stamp_us(m) == stamp]
+
+    # Half way between the last sample before the reset and the first one after it.
+    tell(first)
+    peer.spin_for(0.2)
+    assert silent(first - 1), "between two headings"
+    assert silent(first), "one sample after the reset makes no rate"
+    peer.spin_until(
+        lambda: any("attitude, got 1" in said for said, _ in flight.consumers_said()),
+        "the reason in diagnostics",
+    )
+
+    tell(first + 1, first + 2)
+    peer.spin_for(0.2)
+    assert flight.frame(first + 1).outcome == "OK"
+    message = flight.messages_of("mavros_pose", [first + 1])[first + 1]
+    truth = Truth(first + 1)
+    position, _ = sinks.through_mavros(message.pose)
+    # m; a fifth of what the heading moves it by.
+    moved = np.linalg.norm(heading @ truth.in_ned - truth.in_ned)
+    assert np.linalg.norm(position - heading @ truth.in_ned) < 0.2 * moved
+
+
 def test_nothing_of_it_is_opened_unless_asked_for(
     start_estimator: StartEstimator, peer: Peer
 ) -> None:
@@ -470,7 +512,16 @@ def test_outputs_that_cannot_be_stop_the_node_at_once(
     assert "panicked" not in node.log
 
 
-def test_the_examples_print_distance_and_closing_speed(
+# What both examples print of a message.
+PRINTED = re.compile(
+    r"distance +(?P<distance>\S+) m  closing +(?P<closing>\S+) m/s ±(?P<sigma>\S+)  (?P<envelope>.+) "
+    r"\(contact (?P<contact>\S+) %\)"
+)
+# m and m/s: half of the last digit printed.
+PRINTED_ROUNDING = 5.1e-4
+
+
+def test_the_examples_print_the_true_distance_and_closing_speed(
     peer: Peer,
     start_estimator: StartEstimator,
     rng: np.random.Generator,
@@ -504,12 +555,41 @@ def test_the_examples_print_distance_and_closing_speed(
             timeout_s=2 * PATIENCE_S,
             pause=fly_on,
         )
+        told = {
+            index: message
+            for index in range(0, FRAMES * STRIDE, STRIDE)
+            for message in flight.heard["receptacle"]
+            if message.header.stamp == messages.stamp_of(index)
+        }
         for name, process in running.items():
             assert process.wait() == 0, process.log
             lines = process.log.splitlines()
             assert len(lines) == 3, f"{name}: {process.log}"
+            last = -1
             for line in lines:
-                assert "closing" in line and "m/s" in line and "outside" in line, line
+                printed = PRINTED.fullmatch(line)
+                assert printed, f"{name}: {line}"
+                distance, closing, sigma = (
+                    float(printed[value]) for value in ("distance", "closing", "sigma")
+                )
+                (index, message) = next(
+                    (index, told[index])
+                    for index in sorted(told)
+                    if index > last and abs(told[index].distance - distance) < PRINTED_ROUNDING
+                )
+                last = index
+                truth = Truth(index)
+                ahead = truth.from_probe / np.linalg.norm(truth.from_probe)
+                covariance = np.array(message.covariance).reshape(6, 6)[:3, :3]
+                sigma_m = float(np.sqrt(ahead @ covariance @ ahead))
+                true_distance = np.linalg.norm(truth.from_probe)
+                assert abs(distance - true_distance) < FARTHEST_SIGMAS * sigma_m + PRINTED_ROUNDING
+                assert sigma == pytest.approx(message.closing_speed_sigma, abs=PRINTED_ROUNDING)
+                true_closing = -truth.rate_of("from_probe")[0]
+                assert abs(closing - true_closing) < FARTHEST_SIGMAS * sigma + PRINTED_ROUNDING
+                # An approach, not a retreat, and said with more than its doubt.
+                assert closing > 0.5 > 2 * sigma, line
+                assert printed["envelope"] == "outside" and float(printed["contact"]) == 0.0
     finally:
         for process in running.values():
             process.kill_if_running()
