@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from px4_msgs.msg import VehicleAttitude
-from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
@@ -41,6 +41,8 @@ _NEAR = np.array([0.0, 0.03, -0.02])
 # Of the tanker against the receiver, deg and deg/s: roll, pitch, yaw.
 _ANGLES_DEG = np.array([18.0, -12.0, 25.0])
 _RATES_DPS = np.array([-1.0, 0.9, -1.8])
+# Of the receiver about down, deg/s.
+_TURN_DPS = 3.0
 
 
 def exact_setup(directory: Path) -> Path:
@@ -80,7 +82,7 @@ class Truth:
     @property
     def ned_from_frd(self) -> Array:
         # Three degrees a second to the right, nose up, right wing down.
-        yaw = np.radians(40.0 + 3.0 * self.index * _PERIOD_S)
+        yaw = np.radians(40.0 + _TURN_DPS * self.index * _PERIOD_S)
         return about_z(yaw) @ about_y(np.radians(4.0)) @ about_x(np.radians(9.0))
 
     @property
@@ -132,7 +134,10 @@ class Truth:
     @property
     def imu(self) -> Imu:
         x, y, z, w = to_quaternion(NED_FROM_ENU.T @ self.ned_from_frd @ FRD_FROM_FLU)
+        # A turn about down, in FLU.
+        p, q, r = FRD_FROM_FLU @ self.ned_from_frd.T @ [0.0, 0.0, np.radians(_TURN_DPS)]
         return Imu(
             header=Header(stamp=messages.stamp_of(int(self.index)), frame_id="base_link"),
             orientation=Quaternion(x=x, y=y, z=z, w=w),
+            angular_velocity=Vector3(x=p, y=q, z=r),
         )

@@ -164,8 +164,8 @@ impl Consumers {
             AttitudeMessage::Imu(message) => convert::imu_attitude(message),
         };
         match sample {
-            Ok((stamp_ns, ned_from_frd)) => {
-                self.attitudes.push(stamp_ns, ned_from_frd);
+            Ok(sample) => {
+                self.attitudes.push(sample);
                 if let Some(count) = self.bad_attitude.good() {
                     log::info!("the receiver's attitude is usable again after {count} samples");
                 }
