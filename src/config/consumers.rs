@@ -45,33 +45,82 @@ pub struct ConsumerConfiguration {
     pub attitude_rate_covariance: Matrix3<f64>,
     /// What PX4's clock shows more than ROS's, µs.
     pub px4_minus_ros_us: i64,
+    /// Whether there is a track, which some outputs tell.
+    pub track: bool,
 }
 
-/// An output that cannot be, since what it needs is not given.
+/// Why outputs cannot be as they are asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{output} needs the parameter {needs:?}, which is \"none\"")]
-pub struct MissingForOutput {
+#[non_exhaustive]
+pub enum OutputError {
+    /// What an output needs is not given.
+    #[error("{output} needs the parameter {needs:?}, which is \"none\"")]
+    Missing {
+        /// The parameter that switches it on.
+        output: &'static str,
+        /// The parameter that is missing.
+        needs: &'static str,
+    },
+    /// An output comes from the track, and there is none.
+    #[error("{output} comes from the track: the parameter \"track\" must be true with it")]
+    NoTrack {
+        /// The parameter that switches it on.
+        output: &'static str,
+    },
+    /// Two outputs that one reader would take in turns.
+    #[error(
+        "{first} and {second} exclude each other: PX4 answers the second with a landing target of its own, \
+         which would alternate with the first on one topic"
+    )]
+    TwoWriters {
+        /// The parameter that switches one on.
+        first: &'static str,
+        /// The parameter that switches the other on.
+        second: &'static str,
+    },
+}
+
+/// One output.
+struct OutputSpec {
     /// The parameter that switches it on.
-    pub output: &'static str,
-    /// The parameter that is missing.
-    pub needs: &'static str,
+    name: &'static str,
+    on: bool,
+    needs_attitude: bool,
+    /// It tells the track, not single frames.
+    needs_track: bool,
 }
 
 impl ConsumerConfiguration {
     /// Returns nothing when every output has what it needs.
     ///
     /// # Errors
-    /// [`MissingForOutput`] names the first that has not.
-    pub fn check(&self) -> Result<(), MissingForOutput> {
-        for (output, on, needs_attitude) in self.outputs() {
-            if on && self.refuelling.is_none() {
-                let needs = "refuelling";
-                return Err(MissingForOutput { output, needs });
+    /// [`OutputError`] names the first that has not, or two that exclude each other.
+    pub fn check(&self) -> Result<(), OutputError> {
+        for output in self.outputs().into_iter().filter(|output| output.on) {
+            let missing = |needs| OutputError::Missing {
+                output: output.name,
+                needs,
+            };
+            if self.refuelling.is_none() {
+                return Err(missing("refuelling"));
             }
-            if on && needs_attitude && self.attitude.is_none() {
-                let needs = "attitude";
-                return Err(MissingForOutput { output, needs });
+            if output.needs_attitude && self.attitude.is_none() {
+                return Err(missing("attitude"));
             }
+            if output.needs_track && !self.track {
+                return Err(OutputError::NoTrack {
+                    output: output.name,
+                });
+            }
+        }
+        // PX4's vision_target_estimator publishes landing_target_pose from the marker report. With ours on the same
+        // uORB topic readers see both in turns, and precision landing's approach reads x_abs and y_abs of whatever
+        // comes, valid or not.
+        if self.px4_landing_target && self.px4_fiducial_marker {
+            return Err(OutputError::TwoWriters {
+                first: "publish_px4_landing_target",
+                second: "publish_px4_fiducial_marker",
+            });
         }
         Ok(())
     }
@@ -79,24 +128,37 @@ impl ConsumerConfiguration {
     /// Returns whether any output is on.
     #[must_use]
     pub fn any(&self) -> bool {
-        self.outputs().iter().any(|(_, on, _)| *on)
+        self.outputs().iter().any(|output| output.on)
     }
 
-    fn outputs(&self) -> [(&'static str, bool, bool); 5] {
+    fn outputs(&self) -> [OutputSpec; 5] {
+        let output = |name, on, needs_attitude, needs_track| OutputSpec {
+            name,
+            on,
+            needs_attitude,
+            needs_track,
+        };
         [
-            ("publish_receptacle", self.receptacle, false),
-            ("publish_px4_landing_target", self.px4_landing_target, true),
-            (
+            output("publish_receptacle", self.receptacle, false, true),
+            output(
+                "publish_px4_landing_target",
+                self.px4_landing_target,
+                true,
+                true,
+            ),
+            output(
                 "publish_px4_fiducial_marker",
                 self.px4_fiducial_marker,
                 true,
+                false,
             ),
-            (
+            output(
                 "publish_mavros_landing_target",
                 self.mavros_landing_target,
                 false,
+                false,
             ),
-            ("publish_mavros_pose", self.mavros_pose, true),
+            output("publish_mavros_pose", self.mavros_pose, true, false),
         ]
     }
 }
@@ -129,6 +191,7 @@ impl From<&Parameters> for ConsumerConfiguration {
             attitude_covariance: isotropic("attitude_sigma_deg"),
             attitude_rate_covariance: isotropic("attitude_rate_sigma_dps"),
             px4_minus_ros_us: parameters.integer("px4_minus_ros_us"),
+            track: parameters.bool("track"),
         }
     }
 }
@@ -157,20 +220,54 @@ mod tests {
 
     #[test]
     fn each_output_has_its_own_parameter_and_asks_for_what_it_needs() {
-        let outputs = found(&[]).outputs();
-        for (i, (name, _, needs_attitude)) in outputs.into_iter().enumerate() {
+        for (i, output) in found(&[]).outputs().into_iter().enumerate() {
+            let name = output.name;
             let on = (name, Bool(true));
             let file = ("refuelling", String("a.yaml".into()));
+            let attitude = ("attitude", String("imu".into()));
             let alone = found(std::slice::from_ref(&on));
-            let switched: Vec<bool> = alone.outputs().iter().map(|(_, on, _)| *on).collect();
+            let switched: Vec<bool> = alone.outputs().iter().map(|output| output.on).collect();
             assert_eq!(switched.iter().filter(|on| **on).count(), 1);
             assert!(switched[i] && alone.any(), "{name}");
-            let missing = alone.check().expect_err("no setup");
-            assert_eq!((missing.output, missing.needs), (name, "refuelling"));
+            let missing = |needs| {
+                Err(OutputError::Missing {
+                    output: name,
+                    needs,
+                })
+            };
+            assert_eq!(alone.check(), missing("refuelling"));
             let with_file = found(&[on.clone(), file.clone()]).check();
-            assert_eq!(with_file.is_err(), needs_attitude, "{name}");
-            let with_all = found(&[on, file, ("attitude", String("imu".into()))]);
-            assert_eq!(with_all.check(), Ok(()), "{name}");
+            if output.needs_attitude {
+                assert_eq!(with_file, missing("attitude"));
+            } else {
+                assert_eq!(with_file, Ok(()));
+            }
+            let with_all = [on, file, attitude, ("track", Bool(true))];
+            assert_eq!(found(&with_all).check(), Ok(()), "{name}");
+            let mut without_track = with_all;
+            without_track[3].1 = Bool(false);
+            let refused = Err(OutputError::NoTrack { output: name });
+            let expected = if output.needs_track { refused } else { Ok(()) };
+            assert_eq!(found(&without_track).check(), expected);
+        }
+    }
+
+    #[test]
+    fn the_outputs_that_px4_would_take_in_turns_exclude_each_other_and_no_others_do() {
+        let names = found(&[]).outputs().map(|output| output.name);
+        for (i, first) in names.into_iter().enumerate() {
+            for second in &names[i + 1..] {
+                let refused = found(&[
+                    ("refuelling", String("a.yaml".into())),
+                    ("attitude", String("px4".into())),
+                    (first, Bool(true)),
+                    (second, Bool(true)),
+                ])
+                .check()
+                .is_err();
+                let px4 = first.contains("px4") && second.contains("px4");
+                assert_eq!(refused, px4, "{first} {second}");
+            }
         }
     }
 
@@ -184,6 +281,7 @@ mod tests {
             ("attitude_sigma_deg", Double(2.0)),
             ("attitude_rate_sigma_dps", Double(3.0)),
             ("px4_minus_ros_us", Integer(-7)),
+            ("track", Bool(false)),
         ]);
         assert_eq!(found.receiver_frame_id, "uav1/base_link");
         // The camera looks left.
@@ -195,5 +293,6 @@ mod tests {
         assert!((found.attitude_covariance[(2, 2)] - sigma * sigma).abs() < 1e-18);
         assert!((found.attitude_rate_covariance[(0, 0)] - rate * rate).abs() < 1e-18);
         assert_eq!(found.px4_minus_ros_us, -7);
+        assert!(!found.track);
     }
 }

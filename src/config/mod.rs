@@ -12,7 +12,7 @@ mod table;
 mod value;
 
 pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
-pub use consumers::{AttitudeSource, ConsumerConfiguration, MissingForOutput};
+pub use consumers::{AttitudeSource, ConsumerConfiguration, OutputError};
 pub use parameters::Parameters;
 pub use table::{Kind, ParameterSpec, TABLE};
 pub use value::{ParameterError, ParameterValue};

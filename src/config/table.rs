@@ -243,11 +243,11 @@ pub const TABLE: &[ParameterSpec] = &[
     ),
     output(
         "publish_px4_landing_target",
-        "publish /fmu/in/landing_target_pose from the track, NED; needs attitude",
+        "publish /fmu/in/landing_target_pose from the track, NED; needs attitude, excludes publish_px4_fiducial_marker",
     ),
     output(
         "publish_px4_fiducial_marker",
-        "publish /fmu/in/fiducial_marker_pos_report from single frames, FRD; needs attitude",
+        "publish /fmu/in/fiducial_marker_pos_report from single frames, FRD; needs attitude, excludes publish_px4_landing_target",
     ),
     output(
         "publish_mavros_landing_target",
@@ -255,7 +255,7 @@ pub const TABLE: &[ParameterSpec] = &[
     ),
     output(
         "publish_mavros_pose",
-        "publish /mavros/landing_target/pose from single frames, ENU; needs attitude",
+        "publish /mavros/landing_target/pose from single frames, ENU, for consumers of your own: never for PX4; needs attitude",
     ),
     ParameterSpec {
         name: "attitude",
@@ -360,7 +360,8 @@ pub const TABLE: &[ParameterSpec] = &[
         name: "track",
         kind: Kind::Bool { default: true },
         read_only: false,
-        description: "turn poses over time into odometry; initialisation previous starts from its prediction",
+        description: "turn poses over time into odometry; initialisation previous starts from its prediction; \
+                      receptacle and /fmu/in/landing_target_pose need it",
     },
     ParameterSpec {
         name: "acceleration_density_mps2",
@@ -447,7 +448,7 @@ pub const TABLE: &[ParameterSpec] = &[
         name: "lifecycle",
         kind: Kind::Bool { default: false },
         read_only: true,
-        description: "be a managed node: it loads the marker map and opens its topics when it is configured, \
+        description: "be a managed node: it loads marker map and refuelling file and opens its topics when it is configured, \
                       and answers detections while it is active",
     },
     ParameterSpec {

@@ -9,12 +9,29 @@ const KEPT: usize = 1000;
 /// rad/s; no aircraft turns faster, but an estimator that resets its heading does.
 const FASTEST_RADPS: f64 = 10.0;
 
+/// s; images are answered a few tenths of a second late at most, so the newest attitude is little later than they
+/// are. One that is further ahead has a stamp of another clock, and the attitude between older samples would be
+/// that of another time.
+const FARTHEST_AHEAD_S: f64 = 1.0;
+
+/// What an autopilot said at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudeSample {
+    /// When, ns.
+    pub stamp_ns: i64,
+    /// Takes vectors in the body's axes to local ones.
+    pub local_from_body: UnitQuaternion<f64>,
+    /// In the body's axes, rad/s, where it was measured: a gyro knows it better than the difference of two attitudes.
+    pub rate_in_body: Option<Vector3<f64>>,
+}
+
 /// Attitude and rate of a body against local axes at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeAt {
     /// Takes vectors in the body's axes to local ones.
     pub local_from_body: UnitQuaternion<f64>,
-    /// Against the local axes, in the body's axes, rad/s: the mean between the two samples nearest in time.
+    /// Against the local axes, in the body's axes, rad/s: between the rates of the two samples nearest in time, or,
+    /// where one of them brings none, the mean between their attitudes.
     pub rate_in_body: Vector3<f64>,
 }
 
@@ -33,6 +50,16 @@ pub enum AttitudeError {
     Stale {
         /// s.
         age_s: f64,
+        /// s.
+        limit_s: f64,
+    },
+    /// The newest sample is so much later than the image that their clocks hardly agree.
+    #[error(
+        "the newest attitude of the receiver is {by_s:.3} s later than the image, allowed is {limit_s} s: the clocks do not agree, or the image comes late"
+    )]
+    Ahead {
+        /// s.
+        by_s: f64,
         /// s.
         limit_s: f64,
     },
@@ -65,7 +92,7 @@ pub enum AttitudeError {
 /// The latest samples of an attitude, in the order of their stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttitudeHistory {
-    samples: VecDeque<(i64, UnitQuaternion<f64>)>,
+    samples: VecDeque<AttitudeSample>,
     limit_s: f64,
 }
 
@@ -82,18 +109,18 @@ impl AttitudeHistory {
 
     /// Takes a sample. One that is not later than the last is left out; one that is more than a second
     /// earlier begins anew, since the source of the stamps has.
-    pub fn push(&mut self, stamp_ns: i64, local_from_body: UnitQuaternion<f64>) {
-        if let Some((last_ns, _)) = self.samples.back() {
-            if seconds(*last_ns, stamp_ns) > 1.0 {
+    pub fn push(&mut self, sample: AttitudeSample) {
+        if let Some(last) = self.samples.back() {
+            if seconds(last.stamp_ns, sample.stamp_ns) > 1.0 {
                 self.samples.clear();
-            } else if stamp_ns <= *last_ns {
+            } else if sample.stamp_ns <= last.stamp_ns {
                 return;
             }
         }
         if self.samples.len() == KEPT {
             self.samples.pop_front();
         }
-        self.samples.push_back((stamp_ns, local_from_body));
+        self.samples.push_back(sample);
     }
 
     /// Forgets all samples: the attitude has been corrected by a jump.
@@ -104,46 +131,59 @@ impl AttitudeHistory {
     /// Returns the attitude at a stamp: between two samples, or a little after the last one at the rate of
     /// the last two.
     ///
+    /// An error of the stamps that is smaller than the limits cannot be noticed here: it turns the attitude by as
+    /// much as the body turns in that time.
+    ///
     /// # Errors
     /// [`AttitudeError`] says what is missing; nothing is ever taken from a sample further away.
     pub fn at(&self, stamp_ns: i64) -> Result<AttitudeAt, AttitudeError> {
         let (got, limit_s) = (self.samples.len(), self.limit_s);
         let later = self
             .samples
-            .partition_point(|(sample_ns, _)| *sample_ns < stamp_ns);
+            .partition_point(|sample| sample.stamp_ns < stamp_ns);
         let (Some(first), Some(last)) = (self.samples.front(), self.samples.back()) else {
             return Err(AttitudeError::TooFew { got });
         };
-        if later == 0 && first.0 != stamp_ns {
+        let by_s = seconds(last.stamp_ns, stamp_ns);
+        if by_s > FARTHEST_AHEAD_S {
+            let limit_s = FARTHEST_AHEAD_S;
+            return Err(AttitudeError::Ahead { by_s, limit_s });
+        }
+        if later == 0 && first.stamp_ns != stamp_ns {
             return Err(AttitudeError::BeforeFirst {
-                by_s: seconds(first.0, stamp_ns),
+                by_s: seconds(first.stamp_ns, stamp_ns),
             });
         }
-        let age_s = seconds(stamp_ns, last.0);
+        let age_s = seconds(stamp_ns, last.stamp_ns);
         if age_s > limit_s {
             return Err(AttitudeError::Stale { age_s, limit_s });
         }
         let second = later.clamp(1, got.saturating_sub(1).max(1));
-        let (Some((from_ns, from)), Some((to_ns, to))) =
-            (self.samples.get(second - 1), self.samples.get(second))
+        let (Some(from), Some(to)) = (self.samples.get(second - 1), self.samples.get(second))
         else {
             return Err(AttitudeError::TooFew { got });
         };
-        let gap_s = seconds(*to_ns, *from_ns);
+        let gap_s = seconds(to.stamp_ns, from.stamp_ns);
         if gap_s > limit_s {
             return Err(AttitudeError::Gap { gap_s, limit_s });
         }
-        let rate_in_body = (from.inverse() * to).scaled_axis() / gap_s;
-        let rate_radps = rate_in_body.norm();
+        let since_s = seconds(stamp_ns, from.stamp_ns);
+        let mean = (from.local_from_body.inverse() * to.local_from_body).scaled_axis() / gap_s;
+        let rate_in_body = match (from.rate_in_body, to.rate_in_body) {
+            // After the last sample that of the last one: a line through two noisy rates leads anywhere.
+            (Some(first), Some(then)) => first.lerp(&then, (since_s / gap_s).min(1.0)),
+            _ => mean,
+        };
+        let rate_radps = mean.norm().max(rate_in_body.norm());
         if rate_radps > FASTEST_RADPS {
             return Err(AttitudeError::Jump {
                 rate_radps,
                 limit_radps: FASTEST_RADPS,
             });
         }
-        let turned = UnitQuaternion::from_scaled_axis(rate_in_body * seconds(stamp_ns, *from_ns));
         Ok(AttitudeAt {
-            local_from_body: from * turned,
+            local_from_body: from.local_from_body
+                * UnitQuaternion::from_scaled_axis(mean * since_s),
             rate_in_body,
         })
     }
@@ -173,10 +213,18 @@ mod tests {
         Vector3::new(0.2, -0.1, 0.4)
     }
 
+    fn sample(stamp_ns: i64, local_from_body: UnitQuaternion<f64>) -> AttitudeSample {
+        AttitudeSample {
+            stamp_ns,
+            local_from_body,
+            rate_in_body: None,
+        }
+    }
+
     fn history(stamps_ms: &[i64]) -> AttitudeHistory {
         let mut history = AttitudeHistory::new(LIMIT_S);
         for stamp in stamps_ms {
-            history.push(stamp * MS, turning(stamp * MS));
+            history.push(sample(stamp * MS, turning(stamp * MS)));
         }
         history
     }
@@ -190,6 +238,37 @@ mod tests {
             assert!(error.scaled_axis().norm() < ROUNDING, "{stamp_ms} ms");
             assert!((found.rate_in_body - rate()).norm() < 1e-9, "{stamp_ms} ms");
         }
+    }
+
+    #[test]
+    fn measured_rates_are_taken_as_they_are_between_and_after_the_samples() {
+        let measured = |share: f64| Vector3::new(0.5, 0.0, 0.0) + Vector3::y() * share;
+        let with_rates = |rates: [Option<Vector3<f64>>; 2]| {
+            let mut history = AttitudeHistory::new(LIMIT_S);
+            for (stamp, rate_in_body) in [100, 120].into_iter().zip(rates) {
+                history.push(AttitudeSample {
+                    rate_in_body,
+                    ..sample(stamp * MS, turning(stamp * MS))
+                });
+            }
+            history
+        };
+        let both = with_rates([Some(measured(0.0)), Some(measured(1.0))]);
+        for (stamp_ms, share) in [(100, 0.0), (105, 0.25), (120, 1.0), (150, 1.0)] {
+            let found = both.at(stamp_ms * MS).expect("near the samples");
+            assert!((found.rate_in_body - measured(share)).norm() < ROUNDING);
+            let error = found.local_from_body.inverse() * turning(stamp_ms * MS);
+            assert!(error.scaled_axis().norm() < ROUNDING, "{stamp_ms} ms");
+        }
+        for rates in [[Some(measured(0.0)), None], [None, Some(measured(1.0))]] {
+            let found = with_rates(rates).at(105 * MS).expect("near the samples");
+            assert!((found.rate_in_body - rate()).norm() < 1e-9);
+        }
+        let spinning = Vector3::new(0.0, 0.0, 11.0);
+        assert!(matches!(
+            with_rates([Some(spinning); 2]).at(105 * MS),
+            Err(AttitudeError::Jump { .. })
+        ));
     }
 
     #[test]
@@ -214,12 +293,52 @@ mod tests {
         ));
     }
 
+    /// The attitude for an image of a tenth of a second ago, from samples at 50 Hz with the stamps of a clock that
+    /// shows `offset_ms` more than that of the images.
+    fn with_a_clock_ahead_by(offset_ms: i64) -> Result<AttitudeAt, AttitudeError> {
+        let mut history = AttitudeHistory::new(LIMIT_S);
+        for stamp in (0..=2000).step_by(20) {
+            history.push(sample((stamp + offset_ms) * MS, turning(stamp * MS)));
+        }
+        history.at(1900 * MS)
+    }
+
+    #[test]
+    fn a_clock_that_is_far_off_gives_nothing_in_either_direction() {
+        assert!(with_a_clock_ahead_by(0).is_ok());
+        for offset_ms in [901, 1500, 100_000] {
+            let found = with_a_clock_ahead_by(offset_ms);
+            let true_s = offset_ms as f64 * 1e-3 + 0.1;
+            assert!(
+                matches!(found, Err(AttitudeError::Ahead { by_s, .. }) if (by_s - true_s).abs() < ROUNDING),
+                "{offset_ms} ms: {found:?}"
+            );
+        }
+        for offset_ms in [-151, -1500, -100_000] {
+            let found = with_a_clock_ahead_by(offset_ms);
+            assert!(
+                matches!(found, Err(AttitudeError::Stale { .. })),
+                "{offset_ms} ms: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_a_little_off_turns_the_attitude_by_rate_times_offset() {
+        for offset_ms in [-150, 900] {
+            let found = with_a_clock_ahead_by(offset_ms).expect("within the limits");
+            let error = found.local_from_body.inverse() * turning(1900 * MS);
+            let expected = rate() * (offset_ms as f64 * 1e-3);
+            assert!((error.scaled_axis() - expected).norm() < ROUNDING);
+        }
+    }
+
     #[test]
     fn a_jump_of_the_attitude_gives_nothing_until_it_is_past() {
         let mut history = history(&[100, 120]);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 1.0));
         for stamp in [140, 160] {
-            history.push(stamp * MS, turn * turning(stamp * MS));
+            history.push(sample(stamp * MS, turn * turning(stamp * MS)));
         }
         assert!(matches!(
             history.at(130 * MS),
@@ -233,11 +352,11 @@ mod tests {
     #[test]
     fn stamps_that_repeat_are_left_out_and_a_restart_begins_anew() {
         let mut history = history(&[5000, 5020]);
-        history.push(5020 * MS, UnitQuaternion::identity());
-        history.push(5010 * MS, UnitQuaternion::identity());
+        history.push(sample(5020 * MS, UnitQuaternion::identity()));
+        history.push(sample(5010 * MS, UnitQuaternion::identity()));
         let found = history.at(5015 * MS).expect("two samples");
         assert!((found.rate_in_body - rate()).norm() < 1e-9);
-        history.push(1000 * MS, turning(1000 * MS));
+        history.push(sample(1000 * MS, turning(1000 * MS)));
         assert_eq!(history.at(1000 * MS), Err(AttitudeError::TooFew { got: 1 }));
     }
 
@@ -245,7 +364,7 @@ mod tests {
     fn any_stamps_are_answered() {
         let mut history = AttitudeHistory::new(LIMIT_S);
         for stamp in [i64::MIN, 0, i64::MAX] {
-            history.push(stamp, UnitQuaternion::identity());
+            history.push(sample(stamp, UnitQuaternion::identity()));
             for asked in [i64::MIN, -1, 0, i64::MAX] {
                 let _ = history.at(asked);
             }
@@ -257,7 +376,7 @@ mod tests {
     fn memory_is_bounded() {
         let mut history = AttitudeHistory::new(LIMIT_S);
         for stamp in 0..5000 {
-            history.push(stamp * MS, UnitQuaternion::identity());
+            history.push(sample(stamp * MS, UnitQuaternion::identity()));
         }
         assert_eq!(history.samples.len(), KEPT);
         assert!(history.at(4999 * MS).is_ok());

@@ -35,7 +35,7 @@ mod pose;
 mod time;
 mod variance;
 
-pub use attitude::{AttitudeAt, AttitudeError, AttitudeHistory};
+pub use attitude::{AttitudeAt, AttitudeError, AttitudeHistory, AttitudeSample};
 pub use axes::{flu_from_optical, frd_from_flu, ned_from_enu, rotation_only};
 pub use pose::{LocalAttitude, PoseEstimate};
 pub use time::{TimeError, px4_us_from_ros_ns, ros_ns_from_px4_us};

@@ -124,7 +124,8 @@ impl RefuellingGeometry {
     }
 
     /// Returns the receptacle's motion in the receiver, about the receiver's origin: its attitude is that
-    /// of the tanker. The covariance holds that of the mount and of the receptacle too.
+    /// of the tanker. The covariance holds that of the mount too, and in the position the
+    /// receptacle's own deviation from its place, of whose motion nothing is known.
     #[must_use]
     pub fn receptacle_motion(&self, camera_from_tanker: &Motion) -> Motion {
         let tanker_from_receptacle = Isometry3::from_parts(

@@ -23,6 +23,7 @@ use crate::picture::Picture;
 use crate::pipeline::{
     Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp, TrackCode,
 };
+use crate::refuelling::RefuellingSetup;
 use crate::tracking::TrackOutcome;
 
 /// A topic that never makes the node wait: what a slow subscriber has no room for is dropped and
@@ -68,6 +69,19 @@ pub struct Outputs {
     pub diagnostics: Output<DiagnosticArray>,
     /// What refuelling and flight stacks are told, if wanted.
     pub consumers: Option<Consumers>,
+}
+
+impl Outputs {
+    /// Takes what was read anew since they were opened. Which of them there are is fixed, and so are their names.
+    pub(super) fn configure(
+        &mut self,
+        configuration: &Configuration,
+        setup: Option<RefuellingSetup>,
+    ) {
+        if let (Some(consumers), Some(setup)) = (&mut self.consumers, setup) {
+            consumers.configure(&configuration.consumers, setup);
+        }
+    }
 }
 
 /// The pipeline between its messages.

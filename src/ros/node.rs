@@ -121,13 +121,20 @@ pub fn run_until(
     let qos = QosOverrides::new(endpoints(&names)?);
     let start = start_values(arguments, &names.fully_qualified(), qos)?;
     let configuration = Configuration::from(&start.parameters);
-    // A managed node reads its map when it is configured.
-    let map = if configuration.lifecycle {
+    // What is wrong with fixed parameters, no transition can mend.
+    configuration
+        .consumers
+        .check()
+        .map_err(ConsumersError::from)?;
+    // A managed node reads its files when it is configured.
+    let files = if configuration.lifecycle {
         None
     } else {
-        Some(marker_map(&configuration.marker_map)?)
+        Some((
+            marker_map(&configuration.marker_map)?,
+            consumers::refuelling_setup(&configuration.consumers)?,
+        ))
     };
-    let setup = consumers::refuelling_setup(&configuration.consumers)?;
 
     let options = NodeOptions::new().start_parameter_services(false);
     let mut ros = RosNode::open(NODE_NAME, arguments, environment, options)?;
@@ -141,8 +148,8 @@ pub fn run_until(
     let mut server = Server::new(&mut ros, environment, &parameters, &clock);
     let served = server
         .follow_clock(configuration.use_sim_time)
-        .and_then(|()| match map {
-            Some(map) => server.start(&configuration, map, setup),
+        .and_then(|()| match files {
+            Some((map, setup)) => server.start(&configuration, map, setup),
             None => server.start_managed(),
         })
         // Parameters last: who finds the services finds the topics too.

@@ -221,7 +221,10 @@ impl<'a> Server<'a> {
     ) -> Result<(), EndpointError> {
         self.clean_up();
         let outputs = match std::mem::replace(&mut self.work, Work::Closed) {
-            Work::Idle(outputs) => *outputs,
+            Work::Idle(mut outputs) => {
+                outputs.configure(configuration, setup);
+                *outputs
+            }
             Work::Closed | Work::Ready(_) => {
                 let (inputs, outputs) = open_topics(self.ros, configuration, setup)?;
                 self.inputs = Some(inputs);
@@ -240,7 +243,8 @@ impl<'a> Server<'a> {
         self.with(|estimator| estimator.set_active(on));
     }
 
-    /// Forgets the map, the camera and all that was counted.
+    /// Forgets the map, the camera and all that was counted; what the kept outputs know is replaced when they are
+    /// configured again.
     fn clean_up(&mut self) {
         self.work = match std::mem::replace(&mut self.work, Work::Closed) {
             Work::Ready(estimator) => Work::Idle(Box::new(estimator.into_outputs())),

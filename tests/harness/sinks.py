@@ -17,6 +17,8 @@ from harness.rotations import Array, from_quaternion
 RECENT_US = 1_000_000
 # MAV_FRAME_BODY_FRD and MAV_FRAME_LOCAL_FRD.
 FRAMES_OF_ARDUPILOT = {12, 20}
+# MAV_FRAME_LOCAL_NED, which MAVROS's mav_frame is unless set.
+LOCAL_NED = 1
 # Of a quaternion's length, in single precision and with tf2's tolerance.
 UNIT = 1e-3
 
@@ -110,10 +112,15 @@ def mavros_landing_target(message: Any, _now_us: int) -> Reasons:
 
 
 class MavrosPose:
-    """MAVROS's landing_target plugin, which drops a stamp that it has just had."""
+    """A consumer of poses in ENU; with `mav_frame` MAVROS's landing_target plugin and the autopilots behind it.
 
-    def __init__(self) -> None:
+    The plugin drops a stamp that it has just had. It turns the pose to NED and names it as its parameter says, so no
+    frame makes a relative vector in NED what an autopilot expects.
+    """
+
+    def __init__(self, mav_frame: int | None = None) -> None:
         self._last = (0, 0)
+        self._mav_frame = mav_frame
 
     def __call__(self, message: Any, _now_us: int) -> Reasons:
         reasons = _pose(message.pose)
@@ -125,6 +132,12 @@ class MavrosPose:
         self._last = stamp
         if not message.header.frame_id.strip():
             reasons.append("the frame is not named")
+        if self._mav_frame == LOCAL_NED:
+            reasons.append("PX4 takes LOCAL_NED as an absolute place, ArduPilot drops it")
+        elif self._mav_frame in FRAMES_OF_ARDUPILOT:
+            reasons.append("ArduPilot would take NED for axes of the body")
+        elif self._mav_frame is not None:
+            reasons.append(f"frame {self._mav_frame} is not supported")
         return reasons
 
 

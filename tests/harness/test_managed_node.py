@@ -3,18 +3,24 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RclpyParameter
+from rclpy.parameter_client import AsyncParameterClient
+from tanker_pose.msg import ReceptacleState
 from visualization_msgs.msg import MarkerArray
 
-from harness import messages
+from harness import messages, paper
+from harness.approach import CAMERA_IN_RECEIVER, RECEPTACLE_IN_TANKER, SETUP
 from harness.conftest import StartNode
 from harness.estimator import Estimator
 from harness.messages import key
 from harness.peer import Peer
+from harness.rotations import Array, about_y
 from harness.waiting import wait_until
 
 MANAGED = ("-p", "lifecycle:=true")
@@ -236,6 +242,80 @@ def test_topics_open_when_configured_and_answers_come_only_while_active(
     assert manager.change(label="shutdown")
     assert manager.state() == "finalized"
     expect_silence()
+
+
+def receptacle_from(probe_tip: Array, mount_pitch_deg: float = 0.0) -> Array:
+    """Where the receptacle of the paper's pose is before a probe tip."""
+    in_camera = paper.POSE.transform(RECEPTACLE_IN_TANKER[None, :])[0]
+    mount = about_y(np.radians(mount_pitch_deg))
+    in_receiver = mount @ paper.CAMERA_FROM_RECEIVER.T @ in_camera + CAMERA_IN_RECEIVER
+    return in_receiver - probe_tip
+
+
+def test_what_is_configured_again_follows_the_setups_file_and_the_mount_of_now(
+    start_node: StartNode, peer: Peer, tmp_path: Path
+) -> None:
+    setup = tmp_path / "setup.yaml"
+    text = SETUP.read_text(encoding="utf-8")
+    setup.write_text(text.replace("x: 5.0", "x: much"), encoding="utf-8")
+    node = start_node(
+        *MANAGED, "-p", f"refuelling:={setup}", "-p", "publish_receptacle:=true"
+    )
+    told: list[ReceptacleState] = peer.collect(ReceptacleState, "/receptacle")
+    reports: list[DiagnosticArray] = peer.collect(DiagnosticArray, "/diagnostics")
+    manager = Manager(peer)
+    estimator = Estimator(peer, node)
+    parameters = AsyncParameterClient(peer.node, "/tanker_pose")
+    peer.spin_until(parameters.services_are_ready, "the parameter services")
+
+    def set_pitch(pitch_deg: float) -> None:
+        change = RclpyParameter("camera_mount_pitch_deg", value=pitch_deg)
+        future = parameters.set_parameters([change])
+        peer.spin_until(future.done, "the mount to be set")
+        assert future.result().results[0].successful
+
+    def expect(truth: Array) -> None:
+        estimator.wait_until_heard()
+        estimator.use_camera()
+        before = len(told)
+
+        def ask() -> None:
+            estimator.expect_pose(messages.exact_frame(estimator.next_index()))
+            peer.spin_for(0.05)
+
+        wait_until(lambda: len(told) > before, "a receptacle", pause=ask)
+        position = told[-1].position
+        # m; exact pixels, so only rounding is left.
+        assert np.allclose([position.x, position.y, position.z], truth, atol=1e-4)
+
+    assert not manager.change(CONFIGURE)
+    assert "cannot be configured" in node.log and str(setup) in node.log
+    setup.write_text(text, encoding="utf-8")
+    assert manager.change(CONFIGURE) and manager.change(ACTIVATE), node.log
+    expect(receptacle_from(np.array([5.0, -0.5, 1.0])))
+
+    # While it is unconfigured.
+    assert manager.change(DEACTIVATE) and manager.change(CLEANUP)
+    setup.write_text(text.replace("{x: 5.0, y: -0.5,", "{x: 3.0, y: 0.25,"), encoding="utf-8")
+    set_pitch(4.0)
+    assert manager.change(CONFIGURE) and manager.change(ACTIVATE), node.log
+    expect(receptacle_from(np.array([3.0, 0.25, 1.0]), 4.0))
+
+    def published() -> int:
+        values = {
+            pair.key: pair.value
+            for status in (reports[-1].status if reports else [])
+            for pair in status.values
+        }
+        return int(values.get("receptacle.published", len(told)))
+
+    peer.spin_until(lambda: published() < len(told), "counts that began anew")
+
+    # While it is inactive.
+    assert manager.change(DEACTIVATE)
+    set_pitch(-4.0)
+    assert manager.change(ACTIVATE)
+    expect(receptacle_from(np.array([3.0, 0.25, 1.0]), -4.0))
 
 
 @pytest.mark.parametrize("last", [None, CONFIGURE, ACTIVATE], ids=["unconfigured", "inactive", "active"])

@@ -12,6 +12,14 @@ from harness.processes import REPOSITORY, Process
 from harness.waiting import wait_until
 
 
+def test_the_readme_names_all_that_is_fixed_and_nothing_else() -> None:
+    readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    (sentence,) = re.findall(r"Fixed once the node runs are (.*?)\.", readme)
+    lines = (REPOSITORY / "config" / "tanker_pose.yaml").read_text(encoding="utf-8").splitlines()
+    fixed = {line.split(":")[0].strip() for line in lines if "# (fixed)" in line}
+    assert set(re.findall(r"`(\w+)`", sentence)) == fixed
+
+
 def test_the_python_subscriber_logs_the_pose_and_ends_quietly_on_ctrl_c(
     start_estimator: StartEstimator, domain: int, tmp_path: Path
 ) -> None:

@@ -9,7 +9,7 @@ mod told;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::config::{ConsumerConfiguration, MissingForOutput};
+use crate::config::{ConsumerConfiguration, OutputError};
 use crate::estimation::Solution;
 use crate::frames::{AttitudeHistory, LocalAttitude, PoseEstimate};
 use crate::geometry::Motion;
@@ -20,7 +20,7 @@ use crate::ros::convert;
 use crate::ros::diagnostics::Tally;
 use crate::ros::messages::{
     DiagnosticStatus, FiducialMarkerPosReport, Header, KeyValue, LandingTarget, LandingTargetPose,
-    PoseStamped, ReceptacleState,
+    Message, PoseStamped, ReceptacleState,
 };
 use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, QosProfile, RosNode, reliable};
@@ -34,7 +34,8 @@ pub const PX4_LANDING_TARGET: &str = "/fmu/in/landing_target_pose";
 pub const PX4_FIDUCIAL_MARKER: &str = "/fmu/in/fiducial_marker_pos_report";
 /// MAVROS's landing target (its parameter `listen_lt`).
 pub const MAVROS_LANDING_TARGET: &str = "/mavros/landing_target/raw";
-/// MAVROS's landing target as a pose.
+/// The receptacle as a pose in ENU, under MAVROS's name for a landing target: for consumers of ENU. What MAVROS makes
+/// of it, no autopilot may have: PX4 takes it as an absolute place.
 pub const MAVROS_POSE: &str = "/mavros/landing_target/pose";
 
 /// Reliable, so that MAVROS hears it; PX4's bridge, which asks for best effort, does too.
@@ -44,9 +45,9 @@ pub(super) const QOS: QosProfile = reliable(10);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsumersError {
-    /// A parameter that an output needs.
+    /// Parameters that do not go together.
     #[error(transparent)]
-    Missing(#[from] MissingForOutput),
+    Outputs(#[from] OutputError),
     /// The setup's file.
     #[error("parameter \"refuelling\": cannot read {path:?}: {source}")]
     Unreadable {
@@ -127,6 +128,22 @@ impl Consumers {
         }))
     }
 
+    /// Takes the setup as it is now, with the mount as it is now: a lever arm of yesterday would give a wrong
+    /// place that looks right. Attitudes and counts begin anew, as all does that a clean-up forgets.
+    pub fn configure(&mut self, configuration: &ConsumerConfiguration, setup: RefuellingSetup) {
+        self.setup = setup;
+        self.on_configuration(configuration);
+        self.attitudes.clear();
+        self.resets = None;
+        self.bad_attitude = SaidOnce::default();
+        self.last_bad_attitude = None;
+        begin_anew(&mut self.receptacle);
+        begin_anew(&mut self.px4_landing_target);
+        begin_anew(&mut self.px4_fiducial_marker);
+        begin_anew(&mut self.mavros_landing_target);
+        begin_anew(&mut self.mavros_pose);
+    }
+
     /// Takes changed parameters: of these only the camera's mount can change.
     pub fn on_configuration(&mut self, configuration: &ConsumerConfiguration) {
         self.geometry = self.setup.geometry(&configuration.receiver_from_camera);
@@ -147,8 +164,8 @@ impl Consumers {
             AttitudeMessage::Imu(message) => convert::imu_attitude(message),
         };
         match sample {
-            Ok((stamp_ns, ned_from_frd)) => {
-                self.attitudes.push(stamp_ns, ned_from_frd);
+            Ok(sample) => {
+                self.attitudes.push(sample);
                 if let Some(count) = self.bad_attitude.good() {
                     log::info!("the receiver's attitude is usable again after {count} samples");
                 }
@@ -278,5 +295,11 @@ impl Consumers {
             rate_in_b: found.rate_in_body,
             rate_covariance: self.configuration.attitude_rate_covariance,
         })
+    }
+}
+
+fn begin_anew<M: Message>(told: &mut Option<Told<M>>) {
+    if let Some(told) = told {
+        told.begin_anew();
     }
 }

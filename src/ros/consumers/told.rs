@@ -54,6 +54,14 @@ impl<M: Message> Told<M> {
         }))
     }
 
+    /// Forgets counts and reasons.
+    pub(super) fn begin_anew(&mut self) {
+        self.published = 0;
+        self.silent = 0;
+        self.reason = None;
+        self.said = SaidOnce::default();
+    }
+
     pub(super) fn tell(&mut self, message: Result<M, Silence>, tally: &mut Tally) {
         match message {
             Ok(message) => {

@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use super::tools::pose_message;
 use crate::frames::{
-    LocalAttitude, PoseEstimate, TimeError, VarianceError, frd_from_flu, ned_from_enu,
-    px4_us_from_ros_ns, px4_variances, ros_ns_from_px4_us, rotation_only,
+    AttitudeSample, LocalAttitude, PoseEstimate, TimeError, VarianceError, frd_from_flu,
+    ned_from_enu, px4_us_from_ros_ns, px4_variances, ros_ns_from_px4_us, rotation_only,
 };
 use crate::geometry::Motion;
 use crate::pipeline::Stamp;
@@ -39,6 +39,12 @@ pub enum FlightStackError {
         /// Its length.
         norm: f64,
     },
+    /// A rate that is none.
+    #[error("expected finite rates, got {rate_radps:?} rad/s")]
+    Rate {
+        /// rad/s.
+        rate_radps: [f64; 3],
+    },
     /// The message says that it holds no orientation.
     #[error("expected an Imu with an orientation, got orientation_covariance[0] = -1")]
     NoOrientation,
@@ -46,7 +52,8 @@ pub enum FlightStackError {
 
 /// Returns PX4's landing target of the track: receptacle against receiver, NED.
 ///
-/// The target moves, so it is never static and its velocity never the vehicle's own.
+/// The target moves, so it is never static and its velocity never the vehicle's own. There is no absolute position;
+/// `abs_pos_valid` says so, which not every reader in PX4 looks at.
 ///
 /// # Errors
 /// [`FlightStackError`]: what PX4 would reject is not sent.
@@ -91,7 +98,8 @@ pub fn px4_landing_target(
 
 /// Returns PX4's marker report of one frame: receptacle against receiver, FRD, with the attitude beside it.
 ///
-/// PX4 takes that attitude for exact, so the position's variances hold its error too.
+/// For a PX4 whose vision target estimator is built for moving targets (`CONFIG_VTEST_MOVING=y`): one for static targets
+/// would let EKF2 take the tanker's velocity for the vehicle's own. It takes that attitude for exact, so the position's variances hold its error too.
 ///
 /// # Errors
 /// [`FlightStackError`]: what PX4 would reject is not sent.
@@ -153,7 +161,9 @@ pub fn mavros_landing_target(
     })
 }
 
-/// Returns the receptacle in ENU axes about the receiver's origin, for MAVROS to turn into NED.
+/// Returns the receptacle in ENU axes about the receiver's origin.
+///
+/// For consumers of ENU, not for an autopilot: `MAVROS` would call it `LOCAL_NED`, which PX4 takes as an absolute place.
 ///
 /// # Errors
 /// [`FlightStackError::Position`] for what is not finite.
@@ -171,24 +181,32 @@ pub fn mavros_pose(
     Ok(pose_message(header, &turned(&ned_from_enu(), &ned)))
 }
 
-/// Returns stamp (ns of ROS's clock) and `NED_from_FRD` of PX4's message.
+/// Returns stamp (ns of ROS's clock) and `NED_from_FRD` of PX4's message, which holds no rate.
 ///
 /// # Errors
 /// [`FlightStackError::Time`], [`FlightStackError::Orientation`].
 pub fn px4_attitude(
     message: &VehicleAttitude,
     px4_minus_ros_us: i64,
-) -> Result<(i64, UnitQuaternion<f64>), FlightStackError> {
+) -> Result<AttitudeSample, FlightStackError> {
     let [w, x, y, z] = message.q.map(f64::from);
     let stamp_ns = ros_ns_from_px4_us(message.timestamp_sample, px4_minus_ros_us)?;
-    Ok((stamp_ns, unit(Quaternion::new(w, x, y, z))?))
+    Ok(AttitudeSample {
+        stamp_ns,
+        local_from_body: unit(Quaternion::new(w, x, y, z))?,
+        rate_in_body: None,
+    })
 }
 
-/// Returns stamp (ns) and `NED_from_FRD` of an `Imu` whose orientation is `ENU_from_FLU`.
+/// Returns stamp (ns), `NED_from_FRD` and the gyro's rate (FRD) of an `Imu` whose orientation is `ENU_from_FLU` and whose
+/// rate is in FLU.
+///
+/// No rate where the message says that it holds none, or zero on all axes: a source that fills in attitudes only leaves it
+/// so, and a gyro never is.
 ///
 /// # Errors
-/// [`FlightStackError::NoOrientation`], [`FlightStackError::Orientation`].
-pub fn imu_attitude(message: &Imu) -> Result<(i64, UnitQuaternion<f64>), FlightStackError> {
+/// [`FlightStackError::NoOrientation`], [`FlightStackError::Orientation`], [`FlightStackError::Rate`].
+pub fn imu_attitude(message: &Imu) -> Result<AttitudeSample, FlightStackError> {
     // sensor_msgs/Imu: −1 says that there is none. NaN says nothing about it.
     if message.orientation_covariance[0] < 0.0 {
         return Err(FlightStackError::NoOrientation);
@@ -197,8 +215,21 @@ pub fn imu_attitude(message: &Imu) -> Result<(i64, UnitQuaternion<f64>), FlightS
     let enu_from_flu = unit(Quaternion::new(q.w, q.x, q.y, q.z))?;
     let axes = |rotation: &Rotation3<f64>| UnitQuaternion::from_rotation_matrix(rotation);
     let ned_from_frd = axes(&ned_from_enu()) * enu_from_flu * axes(&frd_from_flu());
-    let stamp_ns = Stamp::from(message.header.stamp).nanoseconds();
-    Ok((stamp_ns, ned_from_frd))
+    let of_gyro = &message.angular_velocity;
+    let rate_in_flu = Vector3::new(of_gyro.x, of_gyro.y, of_gyro.z);
+    // As for the orientation.
+    let says_none = message.angular_velocity_covariance[0] < 0.0;
+    let is_measured = !says_none && rate_in_flu != Vector3::zeros();
+    if is_measured && !rate_in_flu.iter().all(|rate| rate.is_finite()) {
+        return Err(FlightStackError::Rate {
+            rate_radps: rate_in_flu.into(),
+        });
+    }
+    Ok(AttitudeSample {
+        stamp_ns: Stamp::from(message.header.stamp).nanoseconds(),
+        local_from_body: ned_from_frd,
+        rate_in_body: is_measured.then(|| frd_from_flu() * rate_in_flu),
+    })
 }
 
 fn turned(to_from: &Rotation3<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::wire::{descriptor, parameter_message, plain_value, type_of, value_message};
-use crate::config::{ParameterSpec, ParameterValue, Parameters};
+use crate::config::{ConsumerConfiguration, ParameterSpec, ParameterValue, Parameters};
 use crate::ros::messages::{
     ListRequest, ListResult, ParameterDescriptor, SetParametersResult, WireParameter, WireValue,
 };
@@ -109,7 +109,8 @@ impl SharedParameters {
     /// Sets all of the parameters, or none. Returns what they are now, for the others to hear.
     ///
     /// # Errors
-    /// The result that names the first parameter that cannot have its value, and why.
+    /// The result that names the first parameter that cannot have its value, and why, or those that do not go
+    /// together.
     pub fn set(
         &self,
         assignments: &[WireParameter],
@@ -123,6 +124,10 @@ impl SharedParameters {
         for WireParameter { name, value } in assignments {
             self.set_one(&mut changed, name, value).map_err(refuse)?;
         }
+        // Each value may be allowed and yet take from an output what it needs.
+        ConsumerConfiguration::from(&changed)
+            .check()
+            .map_err(|error| refuse(error.to_string()))?;
         for (name, value) in changed.iter() {
             if parameters.get(name) != Some(value) {
                 log::info!("parameter {name} set to {value}");
@@ -253,6 +258,35 @@ mod tests {
         assert!(refusal.reason.contains("min_points"), "{}", refusal.reason);
         assert_eq!(shared.snapshot(), Parameters::default());
         assert!(changes.try_recv().is_err());
+    }
+
+    #[test]
+    fn the_track_cannot_be_switched_off_under_an_output_that_tells_it() {
+        let mut parameters = Parameters::default();
+        for (name, value) in [
+            ("refuelling", ParameterValue::String("a.yaml".into())),
+            ("publish_receptacle", ParameterValue::Bool(true)),
+        ] {
+            parameters.set(name, value).expect("both are allowed");
+        }
+        let (shared, changes) = SharedParameters::new(parameters, &QosOverrides::new(vec![]));
+        let off = parameter_message("track", &ParameterValue::Bool(false));
+        let refusal = shared
+            .set(&[integer("max_outliers", 0), off.clone()])
+            .expect_err("the receptacle comes from the track");
+        assert!(
+            refusal
+                .reason
+                .contains("publish_receptacle comes from the track")
+        );
+        assert!(changes.try_recv().is_err());
+        assert_eq!(
+            shared.snapshot().get("track"),
+            Some(&ParameterValue::Bool(true))
+        );
+
+        let (unused, _changes) = self::shared();
+        assert!(unused.set(&[off]).is_ok());
     }
 
     #[test]

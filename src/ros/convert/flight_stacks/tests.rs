@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix6, Translation3};
 
 use super::*;
 use crate::geometry::{Matrix12, PoseCovariance};
-use crate::ros::messages::Time;
+use crate::ros::messages::{Time, Vector3 as Vector3Message};
 
 /// Of single precision at twenty metres, m.
 const SINGLE_M: f64 = 4e-6;
@@ -141,11 +141,36 @@ fn both_attitudes_of_one_flight_are_the_same() {
         },
         ..Imu::default()
     };
-    let (px4_ns, from_px4) = px4_attitude(&px4, 0).expect("good");
-    let (imu_ns, from_imu) = imu_attitude(&imu).expect("good");
-    assert_eq!((px4_ns, imu_ns), (5_000_000_000, 5_000_000_000));
+    let px4 = px4_attitude(&px4, 0).expect("good");
+    let imu = imu_attitude(&imu).expect("good");
+    assert_eq!((px4.stamp_ns, imu.stamp_ns), (5_000_000_000, 5_000_000_000));
+    let (from_px4, from_imu) = (px4.local_from_body, imu.local_from_body);
     assert!(from_px4.angle_to(&from_imu) < 1e-6);
     assert!((from_imu * Vector3::x() - Vector3::y()).norm() < 1e-12);
+}
+
+#[test]
+fn the_gyros_rate_is_turned_to_frd_and_none_is_made_up() {
+    let mut imu = Imu {
+        angular_velocity: Vector3Message {
+            x: 0.1,
+            y: 0.2,
+            z: 0.3,
+        },
+        ..Imu::default()
+    };
+    let rate = |imu: &Imu| imu_attitude(imu).expect("good").rate_in_body;
+    let found = rate(&imu).expect("it was measured");
+    assert!((found - Vector3::new(0.1, -0.2, -0.3)).norm() < 1e-15);
+    imu.angular_velocity_covariance[0] = -1.0;
+    assert_eq!(rate(&imu), None, "the message says so");
+    assert_eq!(rate(&Imu::default()), None, "never filled in");
+    imu.angular_velocity_covariance[0] = 0.0;
+    imu.angular_velocity.y = f64::NAN;
+    assert!(matches!(
+        imu_attitude(&imu),
+        Err(FlightStackError::Rate { .. })
+    ));
 }
 
 #[test]
