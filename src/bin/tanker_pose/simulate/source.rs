@@ -57,10 +57,14 @@ impl Source {
         info: &camera::CameraInfo,
         frame_id: &str,
     ) -> Result<Self, EndpointError> {
+        // Announced in this order: who hears the detections has found what belongs to them.
+        let truth = ros.publisher(TRUTH, &OUTPUT)?;
+        let camera_info = ros.publisher(CAMERA_INFO, &OUTPUT)?;
+        let feature_points = ros.publisher(FEATURE_POINTS, &OUTPUT)?;
         Ok(Self {
-            feature_points: ros.publisher(FEATURE_POINTS, &OUTPUT)?,
-            camera_info: ros.publisher(CAMERA_INFO, &OUTPUT)?,
-            truth: ros.publisher(TRUTH, &OUTPUT)?,
+            feature_points,
+            camera_info,
+            truth,
             info: info.clone(),
             frame_id: frame_id.to_owned(),
             latest: Stamp::default(),
