@@ -16,6 +16,7 @@ use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
     PoseWithCovarianceStamped, TFMessage,
 };
+use super::node::{ATTITUDE, CAMERA_INFO};
 use super::once::SaidOnce;
 use crate::config::Configuration;
 use crate::estimation::Solution;
@@ -88,7 +89,6 @@ pub struct Estimator {
     watch: Watch,
     refusals: SaidOnce<OutcomeCode>,
     bad_camera: SaidOnce<()>,
-    bad_samples: SaidOnce<&'static str>,
     own_child: SaidOnce<()>,
 }
 
@@ -121,7 +121,6 @@ impl Estimator {
             last_report: Instant::now(),
             refusals: SaidOnce::default(),
             bad_camera: SaidOnce::default(),
-            bad_samples: SaidOnce::default(),
             own_child: SaidOnce::default(),
         }
     }
@@ -141,6 +140,7 @@ impl Estimator {
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
         self.watch.on_camera_info(Instant::now());
+        self.watch.on_decoded(CAMERA_INFO);
         let info = convert::camera_info(message);
         let result = self.pipeline.set_camera(&info, &message.header.frame_id);
         let was_valid = matches!(self.camera, CameraState::Valid { .. });
@@ -154,6 +154,7 @@ impl Estimator {
     pub fn on_detections(&mut self, message: InputMessage) {
         let begin = Instant::now();
         self.watch.on_detections(begin);
+        self.watch.on_decoded(self.reader.input.topic());
         if !self.active {
             self.tally.unanswered += 1;
             return;
@@ -221,6 +222,7 @@ impl Estimator {
 
     /// Takes a sample of the receiver's attitude.
     pub fn on_attitude(&mut self, message: &AttitudeMessage) {
+        self.watch.on_decoded(ATTITUDE);
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_attitude(message);
         }
@@ -245,12 +247,17 @@ impl Estimator {
     /// Takes note of a sample on `topic` that could not be decoded.
     pub fn on_undecodable(&mut self, topic: &'static str, error: &ros2_client::ReadError) {
         self.tally.undecodable += 1;
+        let now = Instant::now();
         if topic == self.reader.input.topic() {
-            self.watch.on_detections(Instant::now());
+            self.watch.on_detections(now);
         }
-        if self.bad_samples.fault(topic, Instant::now()) {
-            log::warn!("cannot decode a sample of {topic}: {error}");
-        }
+        self.watch.on_undecodable(topic, error, now);
+    }
+
+    /// Takes note of samples on `topic` that were passed over because newer ones waited behind them.
+    pub fn on_lost(&mut self, topic: &'static str, count: u64) {
+        self.tally.lost += count;
+        self.watch.on_lost(topic, count, Instant::now());
     }
 
     /// Looks for faults and publishes the diagnostics; `publishers`: of the input, whatever they send.

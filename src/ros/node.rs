@@ -38,6 +38,8 @@ pub const NODE_NAME: &str = "tanker_pose";
 
 /// Input: the camera that took the images.
 pub const CAMERA_INFO: &str = "camera_info";
+/// Input: the receiver's attitude, whatever its topic is called.
+pub(super) const ATTITUDE: &str = "attitude";
 /// Output: trusted poses.
 pub const POSE: &str = "pose";
 /// Output: the track, pose and twist.
@@ -49,6 +51,8 @@ pub const MARKERS: &str = "markers";
 
 /// Samples that wait for the node: enough for a hiccup, too few to lag behind.
 const INPUT: QosProfile = sensor_data(10);
+/// Half a second of a flight controller: samples before and after an image's stamp serve it too.
+const ATTITUDE_INPUT: QosProfile = sensor_data(100);
 /// One second of a 50 Hz camera, for subscribers that acknowledge late.
 const OUTPUT: QosProfile = reliable(50);
 /// As tf2 has it.
@@ -178,8 +182,12 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
         (MARKERS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
         ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
-        (attitude::VEHICLE_ATTITUDE, Role::Subscription, &INPUT),
-        (attitude::IMU, Role::Subscription, &INPUT),
+        (
+            attitude::VEHICLE_ATTITUDE,
+            Role::Subscription,
+            &ATTITUDE_INPUT,
+        ),
+        (attitude::IMU, Role::Subscription, &ATTITUDE_INPUT),
         (consumers::RECEPTACLE, Role::Publisher, &consumers::QOS),
         (
             consumers::PX4_LANDING_TARGET,
@@ -267,6 +275,14 @@ pub(super) struct Inputs {
     pub(super) attitude: AttitudeSubscription,
     /// That of the detections.
     pub(super) topic: &'static str,
+    pub(super) depths: Depths,
+}
+
+/// Most samples that may wait, by topic.
+pub(super) struct Depths {
+    pub(super) detections: usize,
+    pub(super) camera_info: usize,
+    pub(super) attitude: usize,
 }
 
 /// Opens the node's topics.
@@ -296,11 +312,20 @@ pub(super) fn open_topics(
         consumers: Consumers::open(ros, &configuration.consumers, setup)?,
     };
     // Inputs last: what arrives can be answered.
+    let attitude = configuration.consumers.attitude;
+    let depths = Depths {
+        detections: ros.subscription_depth(configuration.input.topic(), &INPUT)?,
+        camera_info: ros.subscription_depth(CAMERA_INFO, &INPUT)?,
+        attitude: attitude.map_or(Ok(1), |source| {
+            ros.subscription_depth(source.topic(), &ATTITUDE_INPUT)
+        })?,
+    };
     let inputs = Inputs {
         camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
-        attitude: AttitudeSubscription::open(ros, configuration.consumers.attitude, &INPUT)?,
+        attitude: AttitudeSubscription::open(ros, attitude, &ATTITUDE_INPUT)?,
         detections: InputSubscription::open(ros, configuration.input, &INPUT)?,
         topic: configuration.input.topic(),
+        depths,
     };
     Ok((inputs, outputs))
 }

@@ -219,6 +219,25 @@ impl RosNode {
             })
     }
 
+    /// Returns how many samples of `topic` may wait, overrides counted; `default` as for [`Self::subscription`].
+    ///
+    /// # Errors
+    /// [`NamesError`] when the name is malformed.
+    pub fn subscription_depth(
+        &self,
+        topic: &str,
+        default: &QosProfile,
+    ) -> Result<usize, NamesError> {
+        let topic = self.names.topic(topic)?;
+        let qos = self
+            .qos_overrides
+            .profile(&topic, Role::Subscription, default);
+        Ok(match qos.history {
+            History::KeepLast { depth } => depth,
+            History::KeepAll => usize::MAX,
+        })
+    }
+
     /// Returns the quality of service that the end of a topic opens with, and takes note of that end.
     fn qos<M: Message>(
         &mut self,

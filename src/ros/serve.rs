@@ -10,8 +10,9 @@ use super::consumers::refuelling_setup;
 use super::environment::Environment;
 use super::estimator::{Estimator, Outputs};
 use super::lifecycle::{Lifecycle, Request, State, WorkResult};
+use super::newest::Newest;
 use super::node::{
-    CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
+    ATTITUDE, CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
     warn_of_too_small_map,
 };
 use super::parameters::SharedParameters;
@@ -19,6 +20,12 @@ use super::participant::{EndpointError, RosNode};
 use crate::config::Configuration;
 use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
+
+/// How often the loop looks whether it could run at all.
+const BEAT: Duration = Duration::from_millis(100);
+/// How long the middleware gets, after a time in which nothing of this process ran, to read what waits in its
+/// sockets: only then can the newest samples be told.
+const CATCH_UP: Duration = Duration::from_millis(20);
 
 /// What stands between the topics.
 enum Work {
@@ -118,16 +125,34 @@ impl<'a> Server<'a> {
                 request = requests.select_next_some() => self.on_request(&request),
             }
         };
-        let camera_infos = inputs.camera_info.async_stream();
-        let (detections, topic) = (inputs.detections.stream(), inputs.topic);
-        let attitudes = inputs.attitude.stream();
+        let (topic, depths) = (inputs.topic, &inputs.depths);
+        let (camera_infos, lost_infos) = Newest::new(
+            Box::pin(inputs.camera_info.async_stream()),
+            depths.camera_info,
+        );
+        let (detections, lost_detections) =
+            Newest::new(inputs.detections.stream(), depths.detections);
+        let (attitudes, lost_attitudes) = Newest::new(inputs.attitude.stream(), depths.attitude);
+        let lost = [
+            (topic, lost_detections),
+            (CAMERA_INFO, lost_infos),
+            (ATTITUDE, lost_attitudes),
+        ];
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        pin_mut!(camera_infos, attitudes, detections, seconds);
+        let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
+        let mut last_beat = Instant::now();
+        pin_mut!(camera_infos, attitudes, detections, seconds, beats);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
             select_biased! {
                 () = stop => break,
+                _ = beats.select_next_some() => {
+                    if last_beat.elapsed() > 2 * BEAT {
+                        smol::Timer::after(CATCH_UP).await;
+                    }
+                    last_beat = Instant::now();
+                }
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Estimator::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
@@ -137,11 +162,15 @@ impl<'a> Server<'a> {
                 }),
                 sample = attitudes.select_next_some() => self.with(|estimator| match sample {
                     Ok(message) => estimator.on_attitude(&message),
-                    Err(error) => estimator.on_undecodable("attitude", &error),
+                    Err(error) => estimator.on_undecodable(ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
                     let graph = self.ros.graph();
+                    for (topic, lost) in &lost {
+                        let count = lost.take();
+                        self.with(|estimator| estimator.on_lost(topic, count));
+                    }
                     self.with(|estimator| estimator.on_second(publishers, &graph, Instant::now()));
                 },
                 sample = detections.select_next_some() => self.with(|estimator| match sample {

@@ -11,6 +11,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import String
@@ -207,6 +208,21 @@ def turn_clock(by_s: int) -> Callable[[Scene], None]:
     return provoke
 
 
+def send_undecodable(scene: Scene) -> None:
+    # As from a definition with a field less at the end.
+    both(scene)
+    good = Scene.message
+    scene.message = lambda topic: (
+        serialize_message(good(scene, topic))[:-5]
+        if topic == "/feature_points"
+        else good(scene, topic)
+    )
+
+
+def send_decodable(scene: Scene) -> None:
+    del scene.message
+
+
 def nothing(scene: Scene) -> None:
     """What is over by itself."""
 
@@ -283,6 +299,12 @@ CASES = {
     "stamps go far ahead": Case("stamp_jump", "ahead by", jump(10_000), nothing),
     "clock goes back": Case("clock_jump", "back by", turn_clock(-500), nothing, SIM_TIME),
     "clock goes far ahead": Case("clock_jump", "ahead by", turn_clock(5000), nothing, SIM_TIME),
+    "detector of another definition": Case(
+        "undecodable",
+        "a sample of feature_points cannot be decoded",
+        send_undecodable,
+        send_decodable,
+    ),
     "no clock": Case(
         "no_clock", "no /clock has come", nothing, lambda scene: scene.speak("/clock"), SIM_TIME
     ),

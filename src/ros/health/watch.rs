@@ -1,5 +1,6 @@
 //! Notices what is wrong around the node, from what arrives, what is refused and what the graph holds.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use super::{Fault, Faults, Jumps, Latency};
@@ -126,6 +127,31 @@ impl Watch {
     pub fn on_camera_info(&mut self, now: Instant) {
         self.camera.take(now);
         self.faults.end(Fault::NoCameraInfo);
+    }
+
+    /// Takes note of a sample of `topic` that could be decoded.
+    pub fn on_decoded(&mut self, topic: &str) {
+        self.faults.end_of(Fault::Undecodable, topic);
+    }
+
+    /// Takes note of a sample of `topic` that could not.
+    pub fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display, now: Instant) {
+        let words = format!(
+            "a sample of {topic} cannot be decoded, its publisher may be built with another definition of its type: \
+             {error}"
+        );
+        self.faults.see_of(Fault::Undecodable, topic, &words, now);
+    }
+
+    /// Takes note of samples of `topic` that were passed over.
+    pub fn on_lost(&mut self, topic: &str, count: u64, now: Instant) {
+        if count > 0 {
+            let words = format!(
+                "{count} sample(s) of {topic} were passed over within a second: the node could not run, or they come \
+                 faster than it takes them"
+            );
+            self.faults.see_of(Fault::LostInput, topic, &words, now);
+        }
     }
 
     /// Takes note of an image from the camera's frame.
