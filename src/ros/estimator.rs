@@ -265,7 +265,7 @@ impl Estimator {
         let second = Second {
             graph,
             clock_jump: self.clock.take_jump(),
-            clock_missing: self.clock.is_missing(),
+            clock_silence: self.clock.silence(),
             dropped: self.tally.take_dropping(),
         };
         self.watch.on_second(second, now);

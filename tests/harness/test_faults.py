@@ -223,6 +223,11 @@ def send_decodable(scene: Scene) -> None:
     del scene.message
 
 
+def stop_clock(scene: Scene) -> None:
+    turn_clock(0)(scene)
+    scene.hush("/clock")
+
+
 def nothing(scene: Scene) -> None:
     """What is over by itself."""
 
@@ -304,6 +309,13 @@ CASES = {
         "a sample of feature_points cannot be decoded",
         send_undecodable,
         send_decodable,
+    ),
+    "clock stops": Case(
+        "no_clock",
+        "/clock has stopped",
+        stop_clock,
+        lambda scene: scene.speak("/clock"),
+        SIM_TIME,
     ),
     "no clock": Case(
         "no_clock", "no /clock has come", nothing, lambda scene: scene.speak("/clock"), SIM_TIME

@@ -12,4 +12,4 @@ mod watch;
 pub use faults::{Fault, Faults};
 pub use jump::{Jumps, seconds_between};
 pub use latency::{Latency, WINDOW_S};
-pub use watch::{Second, Watch};
+pub use watch::{ClockSilence, Second, Watch};

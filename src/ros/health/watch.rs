@@ -68,14 +68,23 @@ fn is_long(since: Instant, now: Instant) -> bool {
     now.saturating_duration_since(since) >= SILENCE
 }
 
+/// How long simulated time has not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClockSilence {
+    /// When the last one came, or since when it is wanted.
+    pub since: Instant,
+    /// Whether one ever came.
+    pub ever: bool,
+}
+
 /// What a second brings beside the messages.
 pub struct Second<'a> {
     /// The other ends of the node's topics.
     pub graph: &'a Graph,
     /// How `/clock` jumped, if it did.
     pub clock_jump: Option<String>,
-    /// Whether simulated time is wanted and none has come.
-    pub clock_missing: bool,
+    /// Since when no simulated time has come, if it is wanted.
+    pub clock_silence: Option<ClockSilence>,
     /// Topics on which something was dropped, and why.
     pub dropped: Vec<(String, String)>,
 }
@@ -95,7 +104,6 @@ pub struct Watch {
     detections: Arrivals,
     camera: Arrivals,
     stamps: Jumps,
-    clock_missing_since: Option<Instant>,
     waiting_said: bool,
 }
 
@@ -113,7 +121,6 @@ impl Watch {
             detections: Arrivals::default(),
             camera: Arrivals::default(),
             stamps: Jumps::default(),
-            clock_missing_since: None,
             waiting_said: false,
         }
     }
@@ -189,7 +196,7 @@ impl Watch {
             self.faults.see_of(fault, words, words, now);
         }
         self.watch_inputs(detectors, cameras, now);
-        self.watch_clock(second.clock_jump, second.clock_missing, now);
+        self.watch_clock(second.clock_jump, second.clock_silence, now);
         for (topic, reason) in second.dropped {
             let words = format!("not all is published on {topic}: {reason}");
             self.faults
@@ -251,21 +258,17 @@ impl Watch {
         }
     }
 
-    fn watch_clock(&mut self, jump: Option<String>, missing: bool, now: Instant) {
+    fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
         if let Some(jump) = jump {
             let words = format!("/clock went {jump}");
             self.faults.see(Fault::ClockJump, &words, now);
         }
-        self.clock_missing_since = if missing {
-            self.clock_missing_since.or(Some(now))
-        } else {
-            None
-        };
-        if self
-            .clock_missing_since
-            .is_some_and(|since| is_long(since, now))
-        {
-            let words = "use_sim_time is set, but no /clock has come: the node's time is zero";
+        if let Some(silence) = silence.filter(|silence| is_long(silence.since, now)) {
+            let words = if silence.ever {
+                "use_sim_time is set, but /clock has stopped: the node's time stands still"
+            } else {
+                "use_sim_time is set, but no /clock has come: the node's time is zero"
+            };
             self.faults.see(Fault::NoClock, words, now);
         }
     }
@@ -279,6 +282,7 @@ mod tests {
     struct Scene {
         watch: Watch,
         graph: Graph,
+        clock: Option<ClockSilence>,
         now: Instant,
     }
 
@@ -288,6 +292,7 @@ mod tests {
             Self {
                 watch: Watch::new("/points".into(), "/camera".into(), now),
                 graph: Graph::default(),
+                clock: None,
                 now,
             }
         }
@@ -309,7 +314,7 @@ mod tests {
                 let second = Second {
                     graph: &self.graph,
                     clock_jump: None,
-                    clock_missing: false,
+                    clock_silence: self.clock,
                     dropped: Vec::new(),
                 };
                 self.watch.on_second(second, self.now);
@@ -348,6 +353,26 @@ mod tests {
         assert_eq!(scene.pass(4, true, false), []);
         assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo]);
         assert_eq!(scene.pass(1, true, true), []);
+    }
+
+    #[test]
+    fn simulated_time_that_never_comes_or_stops_is_a_fault_until_it_comes() {
+        let mut scene = Scene::new();
+        for ever in [false, true] {
+            let since = scene.now;
+            scene.clock = Some(ClockSilence { since, ever });
+            assert_eq!(scene.pass(4, false, false), []);
+            assert_eq!(scene.pass(1, false, false), [Fault::NoClock]);
+            let since = scene.now;
+            scene.clock = Some(ClockSilence { since, ever: true });
+            assert_eq!(scene.pass(1, false, false), []);
+        }
+        scene.clock = None;
+        assert_eq!(
+            scene.pass(60, false, false),
+            [],
+            "time is the system's again"
+        );
     }
 
     #[test]
