@@ -10,7 +10,7 @@ use super::consumers::Consumers;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
-use super::health::{Second, Watch, seconds_between};
+use super::health::{Second, SystemClock, Watch, both_clocks, seconds_between};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
@@ -87,6 +87,7 @@ pub struct Estimator {
     slowest: Duration,
     last_report: Instant,
     watch: Watch,
+    system_clock: SystemClock,
     refusals: SaidOnce<OutcomeCode>,
     bad_camera: SaidOnce<()>,
     own_child: SaidOnce<()>,
@@ -106,6 +107,7 @@ impl Estimator {
     ) -> Self {
         Self {
             watch,
+            system_clock: SystemClock::default(),
             pipeline,
             reader,
             outputs,
@@ -265,6 +267,8 @@ impl Estimator {
         let second = Second {
             graph,
             clock_jump: self.clock.take_jump(),
+            system_clock: both_clocks()
+                .and_then(|(system, steady)| self.system_clock.take(system, steady)),
             clock_silence: self.clock.silence(),
             dropped: self.tally.take_dropping(),
         };

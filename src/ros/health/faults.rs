@@ -22,7 +22,7 @@ pub enum Fault {
     FrameMismatch,
     /// Stamps of detections go back, or far ahead.
     StampJump,
-    /// The simulated time goes back, or far ahead.
+    /// The simulated time goes back, or far ahead, or the system's back.
     ClockJump,
     /// Simulated time is wanted, and none comes.
     NoClock,

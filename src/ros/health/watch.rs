@@ -83,6 +83,8 @@ pub struct Second<'a> {
     pub graph: &'a Graph,
     /// How `/clock` jumped, if it did.
     pub clock_jump: Option<String>,
+    /// What is to be said of the system's clock.
+    pub system_clock: Option<String>,
     /// Since when no simulated time has come, if it is wanted.
     pub clock_silence: Option<ClockSilence>,
     /// Topics on which something was dropped, and why.
@@ -196,6 +198,9 @@ impl Watch {
             self.faults.see_of(fault, words, words, now);
         }
         self.watch_inputs(detectors, cameras, now);
+        if let Some(words) = second.system_clock {
+            self.faults.see_of(Fault::ClockJump, "system", &words, now);
+        }
         self.watch_clock(second.clock_jump, second.clock_silence, now);
         for (topic, reason) in second.dropped {
             let words = format!("not all is published on {topic}: {reason}");
@@ -314,6 +319,7 @@ mod tests {
                 let second = Second {
                     graph: &self.graph,
                     clock_jump: None,
+                    system_clock: None,
                     clock_silence: self.clock,
                     dropped: Vec::new(),
                 };
