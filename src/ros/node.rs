@@ -94,12 +94,18 @@ pub enum NodeError {
     /// A topic cannot be opened.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
+    /// Nothing can be heard or said any more.
+    #[error(
+        "the middleware has ended: its threads do not outlive that the process is stopped and continued \
+         (SIGSTOP, Ctrl-Z, a debugger); start the node again"
+    )]
+    MiddlewareGone,
 }
 
 /// Runs the node until SIGINT or SIGTERM, and leaves the graph; starts logging.
 ///
 /// # Errors
-/// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal.
+/// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal and the end of the middleware.
 pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     logging::start(arguments, &names);
@@ -115,7 +121,7 @@ pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeE
 /// Signals and logging are the caller's: without [`logging::start`] before, nothing is said anywhere.
 ///
 /// # Errors
-/// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop`.
+/// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop` and the end of the middleware.
 pub fn run_until(
     arguments: &Arguments,
     environment: &Environment,
@@ -156,17 +162,19 @@ pub fn run_until(
             Ok((reset, services))
         })
         .map(|((reset, resets), parameter_services)| {
-            smol::block_on(server.serve(stop, changes, resets));
+            let served = smol::block_on(server.serve(stop, changes, resets));
             reset.close();
             parameter_services.close();
+            served
         });
     server.close();
+    let served = served.map_err(NodeError::from).flatten();
     if served.is_ok() {
         log::info!("leaving");
     }
     logging::stop_rosout();
     ros.close();
-    Ok(served?)
+    served
 }
 
 /// Returns the node's topics, for `qos_overrides`.

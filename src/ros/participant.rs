@@ -262,6 +262,17 @@ impl RosNode {
         Graph::of(&self.context.domain_participant(), &self.own_ends)
     }
 
+    /// Returns whether the middleware's threads still run. They end, for good, when the process is stopped and
+    /// continued: the system then interrupts their waits, which `RustDDS` takes for a failure.
+    #[must_use]
+    pub fn is_alive(&self) -> bool {
+        // Asked of the thread that would have to answer; nothing in this node has such a liveliness.
+        self.context
+            .domain_participant()
+            .assert_liveliness()
+            .is_ok()
+    }
+
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.
     pub(super) fn parts(&mut self) -> (&mut Node, DomainParticipant) {
         let participant = self.context.domain_participant();

@@ -105,21 +105,27 @@ impl<'a> Server<'a> {
     }
 
     /// Works until `stop` ends.
+    ///
+    /// # Errors
+    /// [`NodeError::MiddlewareGone`]: without it there is nothing to work with.
     pub(super) async fn serve(
         &mut self,
         stop: impl Future<Output = ()>,
         changes: smol::channel::Receiver<()>,
         resets: smol::channel::Receiver<()>,
-    ) {
+    ) -> Result<(), NodeError> {
         let requests = self.requests.take().unwrap_or_else(no_requests).fuse();
         let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
         pin_mut!(stop, changes, resets, requests);
+        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
+        pin_mut!(seconds);
         let inputs = loop {
             if let Some(inputs) = self.inputs.take() {
                 break inputs;
             }
             select_biased! {
-                () = stop => return,
+                () = stop => return Ok(()),
+                _ = seconds.select_next_some() => self.check_middleware()?,
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Estimator::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
@@ -138,15 +144,14 @@ impl<'a> Server<'a> {
             (CAMERA_INFO, lost_infos),
             (ATTITUDE, lost_attitudes),
         ];
-        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
         let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
         let mut last_beat = Instant::now();
-        pin_mut!(camera_infos, attitudes, detections, seconds, beats);
+        pin_mut!(camera_infos, attitudes, detections, beats);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
             select_biased! {
-                () = stop => break,
+                () = stop => return Ok(()),
                 _ = beats.select_next_some() => {
                     if last_beat.elapsed() > 2 * BEAT {
                         smol::Timer::after(CATCH_UP).await;
@@ -165,6 +170,7 @@ impl<'a> Server<'a> {
                     Err(error) => estimator.on_undecodable(ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
+                    self.check_middleware()?;
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
                     let graph = self.ros.graph();
                     for (topic, lost) in &lost {
@@ -187,6 +193,15 @@ impl<'a> Server<'a> {
             lifecycle.close();
         }
         self.sim_time.close();
+    }
+
+    /// Returns an error when nothing can be heard or said any more: silence would have no reason.
+    fn check_middleware(&self) -> Result<(), NodeError> {
+        if self.ros.is_alive() {
+            Ok(())
+        } else {
+            Err(NodeError::MiddlewareGone)
+        }
     }
 
     fn with(&mut self, act: impl FnOnce(&mut Estimator)) {
