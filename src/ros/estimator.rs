@@ -10,7 +10,7 @@ use super::consumers::Consumers;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
-use super::health::{Second, SystemClock, Watch, both_clocks, seconds_between};
+use super::health::{Fault, Second, SystemClock, Watch, both_clocks, seconds_between};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
@@ -22,7 +22,7 @@ use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
 use crate::pipeline::{
-    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp, TrackCode,
+    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, TrackCode,
 };
 use crate::tracking::TrackOutcome;
 
@@ -90,6 +90,7 @@ pub struct Estimator {
     system_clock: SystemClock,
     refusals: SaidOnce<OutcomeCode>,
     bad_camera: SaidOnce<()>,
+    camera_changes: SaidOnce<()>,
     own_child: SaidOnce<()>,
 }
 
@@ -123,6 +124,7 @@ impl Estimator {
             last_report: Instant::now(),
             refusals: SaidOnce::default(),
             bad_camera: SaidOnce::default(),
+            camera_changes: SaidOnce::default(),
             own_child: SaidOnce::default(),
         }
     }
@@ -147,7 +149,10 @@ impl Estimator {
         let result = self.pipeline.set_camera(&info, &message.header.frame_id);
         let was_valid = matches!(self.camera, CameraState::Valid { .. });
         self.note_camera();
-        if was_valid && result == Ok(true) {
+        if result != Ok(true) {
+            self.camera_changes.good();
+        } else if was_valid && self.camera_changes.fault((), Instant::now()) {
+            // Two drivers on one topic change it with every message.
             log::info!("camera info has changed: {}", self.camera);
         }
     }
@@ -170,7 +175,7 @@ impl Estimator {
             .pipeline
             .camera_for(frame.stamp, &frame.frame_id)
             .is_ok();
-        if is_of_camera && outcome.code() != OutcomeCode::FrameMismatch {
+        if is_of_camera && !is_frame_mismatch(outcome.result.as_ref().err(), &frame.frame_id) {
             self.watch.on_image(header.stamp, begin);
         }
         if let Ok(solution) = &outcome.result {
@@ -187,7 +192,7 @@ impl Estimator {
         self.publish_odometry(&header, &outcome);
         let mut status = convert::status(header.clone(), &outcome, solve_time);
         status.rejected_ids.extend(sighting.ignored_ids);
-        self.take_note(&outcome, &status.message, frame.stamp, solve_time);
+        self.take_note(&outcome, &status.message, &frame, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
@@ -379,15 +384,15 @@ impl Estimator {
 
     fn take_note(
         &mut self,
-        frame: &FrameOutcome,
+        answer: &FrameOutcome,
         message: &str,
-        stamp: Stamp,
+        frame: &DetectionFrame,
         solve_time: Duration,
     ) {
-        let outcome = frame.code();
+        let outcome = answer.code();
         self.tally.count(outcome);
-        self.tally.count_track(frame.track.code());
-        self.last_track = frame.track.outcome;
+        self.tally.count_track(answer.track.code());
+        self.last_track = answer.track.outcome;
         self.slowest = self.slowest.max(solve_time);
         if outcome == OutcomeCode::Ok {
             if let Some(count) = self.refusals.good() {
@@ -398,14 +403,61 @@ impl Estimator {
         }
         self.last_refusal = Some(message.to_owned());
         let now = Instant::now();
-        let (sec, nanosec) = (stamp.sec, stamp.nanosec);
+        let (sec, nanosec) = (frame.stamp.sec, frame.stamp.nanosec);
         let words = format!(
             "refused from {sec}.{nanosec:09} on, {}: {message}",
             outcome.name()
         );
         let is_new = self.refusals.fault(outcome, now);
-        if !self.watch.on_refusal(outcome, &words, now) && is_new {
-            log::warn!("{words}");
+        let is_fault = match outcome {
+            OutcomeCode::NoCameraInfo => Some(Fault::NoCameraInfo),
+            _ if is_frame_mismatch(answer.result.as_ref().err(), &frame.frame_id) => {
+                Some(Fault::FrameMismatch)
+            }
+            _ => None,
+        };
+        match is_fault {
+            Some(fault) => self.watch.on_refusal(fault, &words, now),
+            None if is_new => log::warn!("{words}"),
+            None => {}
+        }
+    }
+}
+
+/// Whether a frame was refused because something in it names another camera's frame. A detection of another time is
+/// no such thing, though its outcome has the same code.
+fn is_frame_mismatch(refusal: Option<&Refusal>, frame_id: &str) -> bool {
+    match refusal {
+        Some(Refusal::FrameMismatch { .. }) => true,
+        Some(Refusal::OtherImage { frame_id: own, .. }) => !own.is_empty() && own != frame_id,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::Stamp;
+
+    #[test]
+    fn detection_of_another_time_names_no_other_frame() {
+        let other = |frame_id: &str| Refusal::OtherImage {
+            id: 1,
+            stamp: Stamp { sec: 1, nanosec: 2 },
+            frame_id: frame_id.to_owned(),
+        };
+        for (refusal, expected) in [
+            (None, false),
+            (Some(other("camera")), false),
+            (Some(other("")), false),
+            (Some(other("another")), true),
+            (Some(Refusal::NoCameraInfo), false),
+        ] {
+            assert_eq!(
+                is_frame_mismatch(refusal.as_ref(), "camera"),
+                expected,
+                "{refusal:?}"
+            );
         }
     }
 }

@@ -4,7 +4,6 @@ use std::fmt;
 use std::time::{Duration, Instant};
 
 use super::{Fault, Faults, Jumps, Latency};
-use crate::pipeline::OutcomeCode;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
 
@@ -12,6 +11,8 @@ use crate::ros::messages::Time;
 const SILENCE: Duration = Duration::from_secs(5);
 /// A camera info counts as steady after so many seconds with one in each; one that is latched never is.
 const STEADY_S: u32 = 3;
+/// How long detections may come before the camera info does, at a start.
+const GRACE: Duration = Duration::from_secs(2);
 /// Without detections and publishers of them for so long, that is said.
 const WAIT: Duration = Duration::from_secs(3);
 /// Most ends of others that are named; a strange graph may have any number.
@@ -35,6 +36,11 @@ impl Arrivals {
     }
 
     fn on_second(&mut self, publishers: usize, now: Instant) {
+        if publishers > 0 && self.heard_since.is_none() {
+            // Begun anew, and perhaps as one that is sent only once.
+            self.steady_s = 0;
+            self.was_steady = false;
+        }
         self.steady_s = if self.this_second {
             self.steady_s.saturating_add(1)
         } else {
@@ -107,6 +113,15 @@ pub struct Watch {
     camera: Arrivals,
     stamps: Jumps,
     waiting_said: bool,
+    without_camera: Option<WithoutCamera>,
+}
+
+/// Refusals for want of a camera info.
+#[derive(Debug)]
+struct WithoutCamera {
+    since: Instant,
+    /// The latest one that was not passed on.
+    latest: Option<String>,
 }
 
 impl Watch {
@@ -124,6 +139,7 @@ impl Watch {
             camera: Arrivals::default(),
             stamps: Jumps::default(),
             waiting_said: false,
+            without_camera: None,
         }
     }
 
@@ -135,6 +151,7 @@ impl Watch {
     /// Takes note that a camera info came.
     pub fn on_camera_info(&mut self, now: Instant) {
         self.camera.take(now);
+        self.without_camera = None;
         self.faults.end(Fault::NoCameraInfo);
     }
 
@@ -173,15 +190,20 @@ impl Watch {
         }
     }
 
-    /// Takes note of a refusal; returns whether it is a fault of the surroundings, and so is said here.
-    pub fn on_refusal(&mut self, outcome: OutcomeCode, words: &str, now: Instant) -> bool {
-        let fault = match outcome {
-            OutcomeCode::NoCameraInfo => Fault::NoCameraInfo,
-            OutcomeCode::FrameMismatch => Fault::FrameMismatch,
-            _ => return false,
-        };
+    /// Takes note of a refusal for a fault of the surroundings.
+    pub fn on_refusal(&mut self, fault: Fault, words: &str, now: Instant) {
+        if fault == Fault::NoCameraInfo {
+            let without = self.without_camera.get_or_insert(WithoutCamera {
+                since: now,
+                latest: None,
+            });
+            if now.saturating_duration_since(without.since) < GRACE {
+                without.latest = Some(words.to_owned());
+                return;
+            }
+            without.latest = None;
+        }
         self.faults.see(fault, words, now);
-        true
     }
 
     /// Looks for faults once a second.
@@ -196,6 +218,12 @@ impl Watch {
                 Misfit::Type(words) => (Fault::WrongType, words),
             };
             self.faults.see_of(fault, words, words, now);
+        }
+        if let Some(without) = &mut self.without_camera
+            && now.saturating_duration_since(without.since) >= GRACE
+            && let Some(words) = without.latest.take()
+        {
+            self.faults.see(Fault::NoCameraInfo, &words, now);
         }
         self.watch_inputs(detectors, cameras, now);
         if let Some(words) = second.system_clock {
@@ -382,15 +410,40 @@ mod tests {
     }
 
     #[test]
+    fn camera_that_begins_anew_may_send_once() {
+        let mut scene = Scene::new();
+        scene.publishers("/camera", 1);
+        assert_eq!(scene.pass(5, true, true), []);
+        scene.publishers("/camera", 0);
+        assert_eq!(scene.pass(4, true, false), []);
+        assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo], "gone");
+        scene.publishers("/camera", 1);
+        assert_eq!(scene.pass(1, true, true), []);
+        assert_eq!(scene.pass(60, true, false), [], "it may be latched now");
+        assert_eq!(scene.pass(3, true, true), []);
+        assert_eq!(scene.pass(5, true, false), [Fault::StaleCameraInfo]);
+    }
+
+    #[test]
+    fn camera_that_comes_a_moment_after_the_detections_is_no_fault() {
+        let mut scene = Scene::new();
+        scene
+            .watch
+            .on_refusal(Fault::NoCameraInfo, "no camera", scene.now);
+        assert_eq!(scene.pass(1, true, false), []);
+        assert_eq!(scene.pass(60, true, true), []);
+    }
+
+    #[test]
     fn refusals_for_the_surroundings_last_until_they_are_answered() {
         let mut scene = Scene::new();
         let (watch, now) = (&mut scene.watch, scene.now);
-        assert!(watch.on_refusal(OutcomeCode::NoCameraInfo, "no camera", now));
-        assert!(watch.on_refusal(OutcomeCode::FrameMismatch, "frames", now));
-        assert!(!watch.on_refusal(OutcomeCode::UnknownId, "id", now));
+        watch.on_refusal(Fault::NoCameraInfo, "no camera", now);
+        watch.on_refusal(Fault::FrameMismatch, "frames", now);
+        assert_eq!(scene.pass(1, true, false), [Fault::FrameMismatch]);
         let both = [Fault::NoCameraInfo, Fault::FrameMismatch];
-        assert_eq!(scene.pass(1, true, false), both);
-        assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
+        assert_eq!(scene.pass(1, true, false), both, "a camera may come late");
+        assert_eq!(scene.pass(2, true, true), [Fault::FrameMismatch]);
         assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
         scene.watch.on_image(Time { sec: 7, nanosec: 0 }, scene.now);
         assert_eq!(scene.pass(1, true, true), []);
