@@ -79,6 +79,7 @@ pub struct Estimator {
     clock: NodeClock,
     node: String,
     active: bool,
+    needed_points: usize,
     camera: CameraState,
     tally: Tally,
     reporter: Reporter,
@@ -115,6 +116,7 @@ impl Estimator {
             clock,
             node: node.to_owned(),
             active: false,
+            needed_points: 0,
             camera: CameraState::Missing,
             tally: Tally::default(),
             reporter: Reporter::default(),
@@ -240,9 +242,25 @@ impl Estimator {
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_configuration(&configuration.consumers);
         }
+        self.warn_of_too_small_map(&configuration);
         self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
         self.note_camera();
+    }
+
+    /// Says what would refuse every frame from now on, if it is not as it was.
+    pub fn warn_of_too_small_map(&mut self, configuration: &Configuration) {
+        let estimator = &configuration.settings.estimator;
+        let need = estimator
+            .min_points
+            .max(estimator.initialisation.min_points());
+        let markers = self.reader.map.markers().len();
+        if need != self.needed_points && markers < need {
+            log::warn!(
+                "every frame will be refused: the marker map has {markers} markers, min_points and initialisation need {need}"
+            );
+        }
+        self.needed_points = need;
     }
 
     /// Forgets the track and the last attitude.

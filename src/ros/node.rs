@@ -28,7 +28,7 @@ use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
 use super::serve::Server;
 use super::start_values::{StartParameterError, start_values};
-use crate::config::Configuration;
+use crate::config::{AttitudeSource, Configuration};
 use crate::pipeline::Pipeline;
 use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
@@ -129,8 +129,9 @@ pub fn run_until(
 ) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     let qos = QosOverrides::new(endpoints(&names)?);
-    let start = start_values(arguments, &names.fully_qualified(), qos)?;
+    let mut start = start_values(arguments, &names.fully_qualified(), qos)?;
     let configuration = Configuration::from(&start.parameters);
+    start.leave_topics(&opened(&names, &configuration)?);
     // A managed node reads its map when it is configured.
     let map = if configuration.lifecycle {
         None
@@ -177,7 +178,7 @@ pub fn run_until(
     served
 }
 
-/// Returns the node's topics, for `qos_overrides`.
+/// Returns all topics that the node may have, for `qos_overrides`.
 fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
     let endpoint = |topic, role, qos| Ok(Endpoint::new(names.topic(topic)?, role, qos));
     [
@@ -219,6 +220,44 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
     .collect()
 }
 
+/// Returns the absolute names of the topics that this configuration opens.
+fn opened(names: &NodeNames, configuration: &Configuration) -> Result<Vec<String>, NamesError> {
+    let consumers = &configuration.consumers;
+    let optional = [
+        (configuration.publish_tf, "/tf"),
+        (configuration.publish_markers, MARKERS),
+        (consumers.receptacle, consumers::RECEPTACLE),
+        (consumers.px4_landing_target, consumers::PX4_LANDING_TARGET),
+        (
+            consumers.px4_fiducial_marker,
+            consumers::PX4_FIDUCIAL_MARKER,
+        ),
+        (
+            consumers.mavros_landing_target,
+            consumers::MAVROS_LANDING_TARGET,
+        ),
+        (consumers.mavros_pose, consumers::MAVROS_POSE),
+    ];
+    [
+        configuration.input.topic(),
+        CAMERA_INFO,
+        POSE,
+        ODOMETRY,
+        STATUS,
+        "/diagnostics",
+    ]
+    .into_iter()
+    .chain(consumers.attitude.map(AttitudeSource::topic))
+    .chain(
+        optional
+            .iter()
+            .filter(|(on, _)| *on)
+            .map(|(_, topic)| *topic),
+    )
+    .map(|topic| names.topic(topic))
+    .collect()
+}
+
 /// Returns the shipped map of this name, or the one in the file at this path.
 pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     if let Some(map) = MarkerMap::shipped(name) {
@@ -228,20 +267,6 @@ pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     let text = std::fs::read_to_string(&path)
         .map_err(|source| NodeError::MapUnreadable { path, source })?;
     Ok(MarkerMap::from_yaml(&text, name)?)
-}
-
-/// Says at the start what would refuse every frame.
-pub(super) fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
-    let estimator = &configuration.settings.estimator;
-    let need = estimator
-        .min_points
-        .max(estimator.initialisation.min_points());
-    let markers = map.markers().len();
-    if markers < need {
-        log::warn!(
-            "every frame will be refused: the marker map has {markers} markers, min_points and initialisation need {need}"
-        );
-    }
 }
 
 pub(super) fn introduce(

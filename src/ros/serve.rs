@@ -13,7 +13,6 @@ use super::lifecycle::{Lifecycle, Request, State, WorkResult};
 use super::newest::Newest;
 use super::node::{
     ATTITUDE, CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
-    warn_of_too_small_map,
 };
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
@@ -274,8 +273,8 @@ impl<'a> Server<'a> {
         };
         let map = Arc::new(map);
         introduce(self.ros, self.environment, &map, configuration);
-        warn_of_too_small_map(configuration, &map);
-        let estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
+        let mut estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
+        estimator.warn_of_too_small_map(configuration);
         self.work = Work::Ready(Box::new(estimator));
         Ok(())
     }
