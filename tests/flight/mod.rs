@@ -123,7 +123,7 @@ pub fn drawn(seed: u64, duration_s: f64, settings: &FilterSettings) -> Vec<Frame
         normal3(&mut random) * settings.initial_speed_sigma_mps,
         normal3(&mut random) * settings.initial_rate_sigma_dps.to_radians(),
     );
-    disturbed(start, duration_s, settings, &mut random, |_, _| {
+    disturbed(&start, duration_s, settings, &mut random, |_, _| {
         (Vector3::zeros(), Vector3::zeros())
     })
 }
@@ -143,7 +143,7 @@ pub fn rough_approach(seed: u64, settings: &FilterSettings) -> Vec<Frame> {
     let planned_velocity = planned(1.0).translation.vector - planned(0.0).translation.vector;
     let start = motion(planned(0.0), planned_velocity, Vector3::zeros());
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    disturbed(start, DURATION_S, settings, &mut random, |time_s, now| {
+    disturbed(&start, DURATION_S, settings, &mut random, |time_s, now| {
         let to_plan = pose_error(&planned(time_s), &now.b_from_a);
         let (away, turned) = (
             to_plan.fixed_rows::<3>(0).into_owned(),
@@ -160,7 +160,7 @@ pub fn rough_approach(seed: u64, settings: &FilterSettings) -> Vec<Frame> {
 /// Returns a motion that white noise of the settings' densities drives, besides the linear and angular
 /// acceleration that `steer` answers to a time and a motion.
 fn disturbed(
-    start: Motion,
+    start: &Motion,
     duration_s: f64,
     settings: &FilterSettings,
     random: &mut ChaCha8Rng,
@@ -169,7 +169,7 @@ fn disturbed(
     let dt = 1.0 / RATE_HZ;
     let acceleration = settings.acceleration_density_mps2;
     let angular = settings.angular_acceleration_density_dps2.to_radians();
-    let mut now = start;
+    let mut now = *start;
     let mut frames = Vec::new();
     let mut time_s = 0.0;
     while time_s <= duration_s + 0.5 * dt {
