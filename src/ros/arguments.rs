@@ -24,7 +24,9 @@ Options:
   -h, --help                     print this help
   -V, --version                  print the version
 
-Topics: feature_points, camera_info in; pose, status, /tf (with publish_tf), /diagnostics out.
+Topics in: camera_info; feature_points, or detections with parameter input; the receiver's attitude, with the outputs
+  for flight stacks that need it. Out: pose, odometry, status, /diagnostics; by parameters /tf, markers, receptacle and
+  those of PX4 and MAVROS. Services: ~/reset, those of parameters, and with lifecycle those of a managed node.
 Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RUST_LOG.
 All parameters stand with their defaults and comments in config/tanker_pose.yaml.
 ";

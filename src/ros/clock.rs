@@ -6,7 +6,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use futures::{StreamExt, pin_mut};
 use ros2_client::Subscription;
 
-use super::health::Jumps;
+use super::health::{ClockSilence, Jumps};
 use super::messages::{Clock, Time};
 use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, sensor_data};
@@ -23,10 +23,12 @@ pub struct NodeClock {
     simulated: Arc<Mutex<Option<Simulated>>>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Simulated {
     /// None until a first one has come.
     time: Option<Time>,
+    /// When it came, or since when it is wanted.
+    since: Instant,
     jumps: Jumps,
     /// The last jump that nobody has asked for yet.
     jump: Option<String>,
@@ -43,20 +45,26 @@ impl NodeClock {
     }
 
     /// Begins or ends simulated time; false when that changes nothing.
-    fn simulate(&self, on: bool) -> bool {
+    fn simulate(&self, on: bool, now: Instant) -> bool {
         let mut simulated = self.lock();
         let changes = on != simulated.is_some();
         if changes {
-            *simulated = on.then(Simulated::default);
+            *simulated = on.then(|| Simulated {
+                time: None,
+                since: now,
+                jumps: Jumps::default(),
+                jump: None,
+            });
         }
         changes
     }
 
     /// Takes a simulated time, if that is wanted.
-    fn set(&self, time: Time) {
+    fn set(&self, time: Time, now: Instant) {
         if let Some(simulated) = self.lock().as_mut() {
             simulated.time = Some(time);
-            let jump = simulated.jumps.take(time, Instant::now());
+            simulated.since = now;
+            let jump = simulated.jumps.take(time, now);
             simulated.jump = jump.or(simulated.jump.take());
         }
     }
@@ -66,9 +74,12 @@ impl NodeClock {
         self.lock().as_mut().and_then(|s| s.jump.take())
     }
 
-    /// Returns whether simulated time is wanted, and none has come.
-    pub(super) fn is_missing(&self) -> bool {
-        self.lock().as_ref().is_some_and(|s| s.time.is_none())
+    /// Returns since when simulated time is wanted and none has come; none while time is the system's.
+    pub(super) fn silence(&self) -> Option<ClockSilence> {
+        self.lock().as_ref().map(|simulated| ClockSilence {
+            since: simulated.since,
+            ever: simulated.time.is_some(),
+        })
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Simulated>> {
@@ -107,7 +118,7 @@ impl SimTime {
             let subscription = ros.subscription(CLOCK, &LATEST)?;
             self.listener = Some(smol::spawn(listen(subscription, self.clock.clone())));
         }
-        if self.clock.simulate(on) {
+        if self.clock.simulate(on, Instant::now()) {
             let source = if on { CLOCK } else { "the system" };
             log::info!("time comes from {source}");
         }
@@ -129,7 +140,7 @@ async fn listen(subscription: Subscription<Clock>, clock: NodeClock) {
     loop {
         let fault = match samples.select_next_some().await {
             Ok((Clock { clock: time }, _)) if time.nanosec < 1_000_000_000 => {
-                clock.set(time);
+                clock.set(time, Instant::now());
                 continue;
             }
             Ok((Clock { clock: time }, _)) => {
@@ -155,27 +166,44 @@ fn system_time() -> Time {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
     fn simulated_time_is_zero_until_it_comes_and_holds_only_while_it_is_wanted() {
         let clock = NodeClock::default();
-        let time = Time { sec: 7, nanosec: 8 };
-        clock.set(time);
+        let (time, now) = (Time { sec: 7, nanosec: 8 }, Instant::now());
+        clock.set(time, now);
         assert!(clock.now().sec > 1_000_000_000, "the system's");
 
-        assert!(clock.simulate(true));
+        assert!(clock.simulate(true, now));
         assert_eq!(clock.now(), Time::default());
-        assert!(clock.is_missing());
-        clock.set(time);
-        assert!(!clock.simulate(true));
+        assert_eq!(
+            clock.silence(),
+            Some(ClockSilence {
+                since: now,
+                ever: false
+            })
+        );
+        let later = now + Duration::from_secs(1);
+        clock.set(time, later);
+        assert!(!clock.simulate(true, now));
         assert_eq!(clock.now(), time, "wanted twice is wanted once");
         assert_eq!(clock.take_jump(), None);
-        clock.set(Time { sec: 6, nanosec: 8 });
+        assert_eq!(
+            clock.silence(),
+            Some(ClockSilence {
+                since: later,
+                ever: true
+            })
+        );
+        clock.set(Time { sec: 6, nanosec: 8 }, later);
         assert_eq!(clock.take_jump().as_deref(), Some("back by 1.000 s"));
         assert_eq!(clock.take_jump(), None, "it is told once");
 
-        assert!(clock.simulate(false));
+        assert!(clock.simulate(false, now));
         assert!(clock.now().sec > 1_000_000_000);
+        assert_eq!(clock.silence(), None);
     }
 }

@@ -62,6 +62,8 @@ pub struct Tally {
     pub unanswered: u64,
     /// Samples that could not be decoded.
     pub undecodable: u64,
+    /// Samples that were passed over because more waited than the topic's depth.
+    pub lost: u64,
     /// Messages not sent because a subscriber did not keep up, or for an error.
     pub dropped: u64,
     /// Topics on which there were such since the last report, and why.
@@ -283,6 +285,7 @@ fn values(tally: &Tally, rates: [(&str, String); 3], situation: &Situation) -> V
         ("publishers".to_owned(), situation.publishers.to_string()),
         ("unanswered".to_owned(), tally.unanswered.to_string()),
         ("undecodable".to_owned(), tally.undecodable.to_string()),
+        ("lost".to_owned(), tally.lost.to_string()),
         ("dropped".to_owned(), tally.dropped.to_string()),
     ];
     let (latency, age) = (situation.latency_s, situation.age_s);

@@ -10,18 +10,19 @@ use super::consumers::Consumers;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
-use super::health::{Second, Watch, seconds_between};
+use super::health::{Fault, Second, SystemClock, Watch, both_clocks, seconds_between};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
     PoseWithCovarianceStamped, TFMessage,
 };
+use super::node::{ATTITUDE, CAMERA_INFO};
 use super::once::SaidOnce;
 use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
 use crate::pipeline::{
-    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, Stamp, TrackCode,
+    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, TrackCode,
 };
 use crate::refuelling::RefuellingSetup;
 use crate::tracking::TrackOutcome;
@@ -92,6 +93,7 @@ pub struct Estimator {
     clock: NodeClock,
     node: String,
     active: bool,
+    needed_points: usize,
     camera: CameraState,
     tally: Tally,
     reporter: Reporter,
@@ -100,9 +102,10 @@ pub struct Estimator {
     slowest: Duration,
     last_report: Instant,
     watch: Watch,
+    system_clock: SystemClock,
     refusals: SaidOnce<OutcomeCode>,
     bad_camera: SaidOnce<()>,
-    bad_samples: SaidOnce<&'static str>,
+    camera_changes: SaidOnce<()>,
     own_child: SaidOnce<()>,
 }
 
@@ -120,12 +123,14 @@ impl Estimator {
     ) -> Self {
         Self {
             watch,
+            system_clock: SystemClock::default(),
             pipeline,
             reader,
             outputs,
             clock,
             node: node.to_owned(),
             active: false,
+            needed_points: 0,
             camera: CameraState::Missing,
             tally: Tally::default(),
             reporter: Reporter::default(),
@@ -135,7 +140,7 @@ impl Estimator {
             last_report: Instant::now(),
             refusals: SaidOnce::default(),
             bad_camera: SaidOnce::default(),
-            bad_samples: SaidOnce::default(),
+            camera_changes: SaidOnce::default(),
             own_child: SaidOnce::default(),
         }
     }
@@ -155,11 +160,15 @@ impl Estimator {
     pub fn on_camera_info(&mut self, message: &CameraInfo) {
         self.tally.camera_infos += 1;
         self.watch.on_camera_info(Instant::now());
+        self.watch.on_decoded(CAMERA_INFO);
         let info = convert::camera_info(message);
         let result = self.pipeline.set_camera(&info, &message.header.frame_id);
         let was_valid = matches!(self.camera, CameraState::Valid { .. });
         self.note_camera();
-        if was_valid && result == Ok(true) {
+        if result != Ok(true) {
+            self.camera_changes.good();
+        } else if was_valid && self.camera_changes.fault((), Instant::now()) {
+            // Two drivers on one topic change it with every message.
             log::info!("camera info has changed: {}", self.camera);
         }
     }
@@ -168,6 +177,7 @@ impl Estimator {
     pub fn on_detections(&mut self, message: InputMessage) {
         let begin = Instant::now();
         self.watch.on_detections(begin);
+        self.watch.on_decoded(self.reader.input.topic());
         if !self.active {
             self.tally.unanswered += 1;
             return;
@@ -181,7 +191,7 @@ impl Estimator {
             .pipeline
             .camera_for(frame.stamp, &frame.frame_id)
             .is_ok();
-        if is_of_camera && outcome.code() != OutcomeCode::FrameMismatch {
+        if is_of_camera && !is_frame_mismatch(outcome.result.as_ref().err(), &frame.frame_id) {
             self.watch.on_image(header.stamp, begin);
         }
         if let Ok(solution) = &outcome.result {
@@ -198,7 +208,7 @@ impl Estimator {
         self.publish_odometry(&header, &outcome);
         let mut status = convert::status(header.clone(), &outcome, solve_time);
         status.rejected_ids.extend(sighting.ignored_ids);
-        self.take_note(&outcome, &status.message, frame.stamp, solve_time);
+        self.take_note(&outcome, &status.message, &frame, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
@@ -235,6 +245,7 @@ impl Estimator {
 
     /// Takes a sample of the receiver's attitude.
     pub fn on_attitude(&mut self, message: &AttitudeMessage) {
+        self.watch.on_decoded(ATTITUDE);
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_attitude(message);
         }
@@ -245,9 +256,25 @@ impl Estimator {
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_configuration(&configuration.consumers);
         }
+        self.warn_of_too_small_map(&configuration);
         self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
         self.note_camera();
+    }
+
+    /// Says what would refuse every frame from now on, if it is not as it was.
+    pub fn warn_of_too_small_map(&mut self, configuration: &Configuration) {
+        let estimator = &configuration.settings.estimator;
+        let need = estimator
+            .min_points
+            .max(estimator.initialisation.min_points());
+        let markers = self.reader.map.markers().len();
+        if need != self.needed_points && markers < need {
+            log::warn!(
+                "every frame will be refused: the marker map has {markers} markers, min_points and initialisation need {need}"
+            );
+        }
+        self.needed_points = need;
     }
 
     /// Forgets the track and the last attitude.
@@ -259,12 +286,17 @@ impl Estimator {
     /// Takes note of a sample on `topic` that could not be decoded.
     pub fn on_undecodable(&mut self, topic: &'static str, error: &ros2_client::ReadError) {
         self.tally.undecodable += 1;
+        let now = Instant::now();
         if topic == self.reader.input.topic() {
-            self.watch.on_detections(Instant::now());
+            self.watch.on_detections(now);
         }
-        if self.bad_samples.fault(topic, Instant::now()) {
-            log::warn!("cannot decode a sample of {topic}: {error}");
-        }
+        self.watch.on_undecodable(topic, error, now);
+    }
+
+    /// Takes note of samples on `topic` that were passed over because newer ones waited behind them.
+    pub fn on_lost(&mut self, topic: &'static str, count: u64) {
+        self.tally.lost += count;
+        self.watch.on_lost(topic, count, Instant::now());
     }
 
     /// Looks for faults and publishes the diagnostics; `publishers`: of the input, whatever they send.
@@ -272,7 +304,9 @@ impl Estimator {
         let second = Second {
             graph,
             clock_jump: self.clock.take_jump(),
-            clock_missing: self.clock.is_missing(),
+            system_clock: both_clocks()
+                .and_then(|(system, steady)| self.system_clock.take(system, steady)),
+            clock_silence: self.clock.silence(),
             dropped: self.tally.take_dropping(),
         };
         self.watch.on_second(second, now);
@@ -382,15 +416,15 @@ impl Estimator {
 
     fn take_note(
         &mut self,
-        frame: &FrameOutcome,
+        answer: &FrameOutcome,
         message: &str,
-        stamp: Stamp,
+        frame: &DetectionFrame,
         solve_time: Duration,
     ) {
-        let outcome = frame.code();
+        let outcome = answer.code();
         self.tally.count(outcome);
-        self.tally.count_track(frame.track.code());
-        self.last_track = frame.track.outcome;
+        self.tally.count_track(answer.track.code());
+        self.last_track = answer.track.outcome;
         self.slowest = self.slowest.max(solve_time);
         if outcome == OutcomeCode::Ok {
             if let Some(count) = self.refusals.good() {
@@ -401,14 +435,61 @@ impl Estimator {
         }
         self.last_refusal = Some(message.to_owned());
         let now = Instant::now();
-        let (sec, nanosec) = (stamp.sec, stamp.nanosec);
+        let (sec, nanosec) = (frame.stamp.sec, frame.stamp.nanosec);
         let words = format!(
             "refused from {sec}.{nanosec:09} on, {}: {message}",
             outcome.name()
         );
         let is_new = self.refusals.fault(outcome, now);
-        if !self.watch.on_refusal(outcome, &words, now) && is_new {
-            log::warn!("{words}");
+        let is_fault = match outcome {
+            OutcomeCode::NoCameraInfo => Some(Fault::NoCameraInfo),
+            _ if is_frame_mismatch(answer.result.as_ref().err(), &frame.frame_id) => {
+                Some(Fault::FrameMismatch)
+            }
+            _ => None,
+        };
+        match is_fault {
+            Some(fault) => self.watch.on_refusal(fault, &words, now),
+            None if is_new => log::warn!("{words}"),
+            None => {}
+        }
+    }
+}
+
+/// Whether a frame was refused because something in it names another camera's frame. A detection of another time is
+/// no such thing, though its outcome has the same code.
+fn is_frame_mismatch(refusal: Option<&Refusal>, frame_id: &str) -> bool {
+    match refusal {
+        Some(Refusal::FrameMismatch { .. }) => true,
+        Some(Refusal::OtherImage { frame_id: own, .. }) => !own.is_empty() && own != frame_id,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::Stamp;
+
+    #[test]
+    fn detection_of_another_time_names_no_other_frame() {
+        let other = |frame_id: &str| Refusal::OtherImage {
+            id: 1,
+            stamp: Stamp { sec: 1, nanosec: 2 },
+            frame_id: frame_id.to_owned(),
+        };
+        for (refusal, expected) in [
+            (None, false),
+            (Some(other("camera")), false),
+            (Some(other("")), false),
+            (Some(other("another")), true),
+            (Some(Refusal::NoCameraInfo), false),
+        ] {
+            assert_eq!(
+                is_frame_mismatch(refusal.as_ref(), "camera"),
+                expected,
+                "{refusal:?}"
+            );
         }
     }
 }

@@ -17,9 +17,11 @@ use super::names::NodeNames;
 
 /// This package's own lines from info on; other crates' from warnings on, but the middleware's from
 /// errors on: it warns of every packet and every string that is not as it should be, which here is
-/// counted, and said once. What the client library says of `ROS_DISTRO` is an error to it even where both
+/// counted, and said once. Not even its errors about the order of samples: while the system's clock is behind there is
+/// one for every look at an input, and the fault `clock_jump` says it. What the client library says of `ROS_DISTRO` is an error to it even where both
 /// distributions speak alike; `distribution` tells the two apart.
-const DEFAULT_FILTER: &str = "warn,tanker_pose=info,rustdds=error,ros2_client=error,\
+const DEFAULT_FILTER: &str = "warn,tanker_pose=info,rustdds=error,\
+    rustdds::structure::dds_cache=off,ros2_client=error,\
     ros2_client::distributions=off,cdr_encoding=error";
 /// The crates of this package, library and programs, by the beginning of their names. Only their
 /// lines go to /rosout: publishing those of the middleware would bring forth more of them.

@@ -10,6 +10,7 @@
 //! lifecycle                          a managed node's states, behind their services
 //! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
+//! newest                             what is left out when more samples wait than a topic's depth
 //! graph, health                      the other ends of the topics; faults around the node, said and shown
 //! consumers, attitude                what refuelling and flight stacks are told, by the receiver's attitude
 //! estimator, diagnostics             one message's work, and the node's health once a second
@@ -36,6 +37,7 @@ pub mod lifecycle;
 pub mod logging;
 pub mod messages;
 pub mod names;
+pub mod newest;
 pub mod node;
 pub mod once;
 pub mod parameter_file;

@@ -28,7 +28,7 @@ use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
 use super::serve::Server;
 use super::start_values::{StartParameterError, start_values};
-use crate::config::Configuration;
+use crate::config::{AttitudeSource, Configuration};
 use crate::pipeline::Pipeline;
 use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
@@ -38,6 +38,8 @@ pub const NODE_NAME: &str = "tanker_pose";
 
 /// Input: the camera that took the images.
 pub const CAMERA_INFO: &str = "camera_info";
+/// Input: the receiver's attitude, whatever its topic is called.
+pub(super) const ATTITUDE: &str = "attitude";
 /// Output: trusted poses.
 pub const POSE: &str = "pose";
 /// Output: the track, pose and twist.
@@ -49,6 +51,8 @@ pub const MARKERS: &str = "markers";
 
 /// Samples that wait for the node: enough for a hiccup, too few to lag behind.
 const INPUT: QosProfile = sensor_data(10);
+/// Half a second of a flight controller: samples before and after an image's stamp serve it too.
+const ATTITUDE_INPUT: QosProfile = sensor_data(100);
 /// One second of a 50 Hz camera, for subscribers that acknowledge late.
 const OUTPUT: QosProfile = reliable(50);
 /// As tf2 has it.
@@ -90,12 +94,18 @@ pub enum NodeError {
     /// A topic cannot be opened.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
+    /// Nothing can be heard or said any more.
+    #[error(
+        "the middleware has ended: its threads do not outlive that the process is stopped and continued \
+         (SIGSTOP, Ctrl-Z, a debugger); start the node again"
+    )]
+    MiddlewareGone,
 }
 
 /// Runs the node until SIGINT or SIGTERM, and leaves the graph; starts logging.
 ///
 /// # Errors
-/// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal.
+/// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal and the end of the middleware.
 pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     logging::start(arguments, &names);
@@ -111,7 +121,7 @@ pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeE
 /// Signals and logging are the caller's: without [`logging::start`] before, nothing is said anywhere.
 ///
 /// # Errors
-/// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop`.
+/// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop` and the end of the middleware.
 pub fn run_until(
     arguments: &Arguments,
     environment: &Environment,
@@ -119,13 +129,14 @@ pub fn run_until(
 ) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     let qos = QosOverrides::new(endpoints(&names)?);
-    let start = start_values(arguments, &names.fully_qualified(), qos)?;
+    let mut start = start_values(arguments, &names.fully_qualified(), qos)?;
     let configuration = Configuration::from(&start.parameters);
     // What is wrong with fixed parameters, no transition can mend.
     configuration
         .consumers
         .check()
         .map_err(ConsumersError::from)?;
+    start.leave_topics(&opened(&names, &configuration)?);
     // A managed node reads its files when it is configured.
     let files = if configuration.lifecycle {
         None
@@ -159,20 +170,22 @@ pub fn run_until(
             Ok((reset, services))
         })
         .map(|((reset, resets), parameter_services)| {
-            smol::block_on(server.serve(stop, changes, resets));
+            let served = smol::block_on(server.serve(stop, changes, resets));
             reset.close();
             parameter_services.close();
+            served
         });
     server.close();
+    let served = served.map_err(NodeError::from).flatten();
     if served.is_ok() {
         log::info!("leaving");
     }
     logging::stop_rosout();
     ros.close();
-    Ok(served?)
+    served
 }
 
-/// Returns the node's topics, for `qos_overrides`.
+/// Returns all topics that the node may have, for `qos_overrides`.
 fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
     let endpoint = |topic, role, qos| Ok(Endpoint::new(names.topic(topic)?, role, qos));
     [
@@ -185,8 +198,12 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
         (MARKERS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
         ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
-        (attitude::VEHICLE_ATTITUDE, Role::Subscription, &INPUT),
-        (attitude::IMU, Role::Subscription, &INPUT),
+        (
+            attitude::VEHICLE_ATTITUDE,
+            Role::Subscription,
+            &ATTITUDE_INPUT,
+        ),
+        (attitude::IMU, Role::Subscription, &ATTITUDE_INPUT),
         (consumers::RECEPTACLE, Role::Publisher, &consumers::QOS),
         (
             consumers::PX4_LANDING_TARGET,
@@ -210,6 +227,44 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
     .collect()
 }
 
+/// Returns the absolute names of the topics that this configuration opens.
+fn opened(names: &NodeNames, configuration: &Configuration) -> Result<Vec<String>, NamesError> {
+    let consumers = &configuration.consumers;
+    let optional = [
+        (configuration.publish_tf, "/tf"),
+        (configuration.publish_markers, MARKERS),
+        (consumers.receptacle, consumers::RECEPTACLE),
+        (consumers.px4_landing_target, consumers::PX4_LANDING_TARGET),
+        (
+            consumers.px4_fiducial_marker,
+            consumers::PX4_FIDUCIAL_MARKER,
+        ),
+        (
+            consumers.mavros_landing_target,
+            consumers::MAVROS_LANDING_TARGET,
+        ),
+        (consumers.mavros_pose, consumers::MAVROS_POSE),
+    ];
+    [
+        configuration.input.topic(),
+        CAMERA_INFO,
+        POSE,
+        ODOMETRY,
+        STATUS,
+        "/diagnostics",
+    ]
+    .into_iter()
+    .chain(consumers.attitude.map(AttitudeSource::topic))
+    .chain(
+        optional
+            .iter()
+            .filter(|(on, _)| *on)
+            .map(|(_, topic)| *topic),
+    )
+    .map(|topic| names.topic(topic))
+    .collect()
+}
+
 /// Returns the shipped map of this name, or the one in the file at this path.
 pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     if let Some(map) = MarkerMap::shipped(name) {
@@ -219,20 +274,6 @@ pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     let text = std::fs::read_to_string(&path)
         .map_err(|source| NodeError::MapUnreadable { path, source })?;
     Ok(MarkerMap::from_yaml(&text, name)?)
-}
-
-/// Says at the start what would refuse every frame.
-pub(super) fn warn_of_too_small_map(configuration: &Configuration, map: &MarkerMap) {
-    let estimator = &configuration.settings.estimator;
-    let need = estimator
-        .min_points
-        .max(estimator.initialisation.min_points());
-    let markers = map.markers().len();
-    if markers < need {
-        log::warn!(
-            "every frame will be refused: the marker map has {markers} markers, min_points and initialisation need {need}"
-        );
-    }
 }
 
 pub(super) fn introduce(
@@ -274,6 +315,14 @@ pub(super) struct Inputs {
     pub(super) attitude: AttitudeSubscription,
     /// That of the detections.
     pub(super) topic: &'static str,
+    pub(super) depths: Depths,
+}
+
+/// Most samples that may wait, by topic.
+pub(super) struct Depths {
+    pub(super) detections: usize,
+    pub(super) camera_info: usize,
+    pub(super) attitude: usize,
 }
 
 /// Opens the node's topics.
@@ -303,11 +352,20 @@ pub(super) fn open_topics(
         consumers: Consumers::open(ros, &configuration.consumers, setup)?,
     };
     // Inputs last: what arrives can be answered.
+    let attitude = configuration.consumers.attitude;
+    let depths = Depths {
+        detections: ros.subscription_depth(configuration.input.topic(), &INPUT)?,
+        camera_info: ros.subscription_depth(CAMERA_INFO, &INPUT)?,
+        attitude: attitude.map_or(Ok(1), |source| {
+            ros.subscription_depth(source.topic(), &ATTITUDE_INPUT)
+        })?,
+    };
     let inputs = Inputs {
         camera_info: ros.subscription(CAMERA_INFO, &INPUT)?,
-        attitude: AttitudeSubscription::open(ros, configuration.consumers.attitude, &INPUT)?,
+        attitude: AttitudeSubscription::open(ros, attitude, &ATTITUDE_INPUT)?,
         detections: InputSubscription::open(ros, configuration.input, &INPUT)?,
         topic: configuration.input.topic(),
+        depths,
     };
     Ok((inputs, outputs))
 }

@@ -219,6 +219,25 @@ impl RosNode {
             })
     }
 
+    /// Returns how many samples of `topic` may wait, overrides counted; `default` as for [`Self::subscription`].
+    ///
+    /// # Errors
+    /// [`NamesError`] when the name is malformed.
+    pub fn subscription_depth(
+        &self,
+        topic: &str,
+        default: &QosProfile,
+    ) -> Result<usize, NamesError> {
+        let topic = self.names.topic(topic)?;
+        let qos = self
+            .qos_overrides
+            .profile(&topic, Role::Subscription, default);
+        Ok(match qos.history {
+            History::KeepLast { depth } => depth,
+            History::KeepAll => usize::MAX,
+        })
+    }
+
     /// Returns the quality of service that the end of a topic opens with, and takes note of that end.
     fn qos<M: Message>(
         &mut self,
@@ -241,6 +260,17 @@ impl RosNode {
     #[must_use]
     pub fn graph(&self) -> Graph {
         Graph::of(&self.context.domain_participant(), &self.own_ends)
+    }
+
+    /// Returns whether the middleware's threads still run. They end, for good, when the process is stopped and
+    /// continued: the system then interrupts their waits, which `RustDDS` takes for a failure.
+    #[must_use]
+    pub fn is_alive(&self) -> bool {
+        // Asked of the thread that would have to answer; nothing in this node has such a liveliness.
+        self.context
+            .domain_participant()
+            .assert_liveliness()
+            .is_ok()
     }
 
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.

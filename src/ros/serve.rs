@@ -10,15 +10,21 @@ use super::consumers::refuelling_setup;
 use super::environment::Environment;
 use super::estimator::{Estimator, Outputs};
 use super::lifecycle::{Lifecycle, Request, State, WorkResult};
+use super::newest::Newest;
 use super::node::{
-    CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
-    warn_of_too_small_map,
+    ATTITUDE, CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
 };
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
 use crate::config::Configuration;
 use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
+
+/// How often the loop looks whether it could run at all.
+const BEAT: Duration = Duration::from_millis(100);
+/// How long the middleware gets, after a time in which nothing of this process ran, to read what waits in its
+/// sockets: only then can the newest samples be told.
+const CATCH_UP: Duration = Duration::from_millis(20);
 
 /// What stands between the topics.
 enum Work {
@@ -98,36 +104,59 @@ impl<'a> Server<'a> {
     }
 
     /// Works until `stop` ends.
+    ///
+    /// # Errors
+    /// [`NodeError::MiddlewareGone`]: without it there is nothing to work with.
     pub(super) async fn serve(
         &mut self,
         stop: impl Future<Output = ()>,
         changes: smol::channel::Receiver<()>,
         resets: smol::channel::Receiver<()>,
-    ) {
+    ) -> Result<(), NodeError> {
         let requests = self.requests.take().unwrap_or_else(no_requests).fuse();
         let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
         pin_mut!(stop, changes, resets, requests);
+        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
+        pin_mut!(seconds);
         let inputs = loop {
             if let Some(inputs) = self.inputs.take() {
                 break inputs;
             }
             select_biased! {
-                () = stop => return,
+                () = stop => return Ok(()),
+                _ = seconds.select_next_some() => self.check_middleware()?,
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Estimator::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
             }
         };
-        let camera_infos = inputs.camera_info.async_stream();
-        let (detections, topic) = (inputs.detections.stream(), inputs.topic);
-        let attitudes = inputs.attitude.stream();
-        let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        pin_mut!(camera_infos, attitudes, detections, seconds);
+        let (topic, depths) = (inputs.topic, &inputs.depths);
+        let (camera_infos, lost_infos) = Newest::new(
+            Box::pin(inputs.camera_info.async_stream()),
+            depths.camera_info,
+        );
+        let (detections, lost_detections) =
+            Newest::new(inputs.detections.stream(), depths.detections);
+        let (attitudes, lost_attitudes) = Newest::new(inputs.attitude.stream(), depths.attitude);
+        let lost = [
+            (topic, lost_detections),
+            (CAMERA_INFO, lost_infos),
+            (ATTITUDE, lost_attitudes),
+        ];
+        let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
+        let mut last_beat = Instant::now();
+        pin_mut!(camera_infos, attitudes, detections, beats);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
             select_biased! {
-                () = stop => break,
+                () = stop => return Ok(()),
+                _ = beats.select_next_some() => {
+                    if last_beat.elapsed() > 2 * BEAT {
+                        smol::Timer::after(CATCH_UP).await;
+                    }
+                    last_beat = Instant::now();
+                }
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Estimator::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
@@ -137,11 +166,16 @@ impl<'a> Server<'a> {
                 }),
                 sample = attitudes.select_next_some() => self.with(|estimator| match sample {
                     Ok(message) => estimator.on_attitude(&message),
-                    Err(error) => estimator.on_undecodable("attitude", &error),
+                    Err(error) => estimator.on_undecodable(ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
+                    self.check_middleware()?;
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
                     let graph = self.ros.graph();
+                    for (topic, lost) in &lost {
+                        let count = lost.take();
+                        self.with(|estimator| estimator.on_lost(topic, count));
+                    }
                     self.with(|estimator| estimator.on_second(publishers, &graph, Instant::now()));
                 },
                 sample = detections.select_next_some() => self.with(|estimator| match sample {
@@ -158,6 +192,15 @@ impl<'a> Server<'a> {
             lifecycle.close();
         }
         self.sim_time.close();
+    }
+
+    /// Returns an error when nothing can be heard or said any more: silence would have no reason.
+    fn check_middleware(&self) -> Result<(), NodeError> {
+        if self.ros.is_alive() {
+            Ok(())
+        } else {
+            Err(NodeError::MiddlewareGone)
+        }
     }
 
     fn with(&mut self, act: impl FnOnce(&mut Estimator)) {
@@ -233,8 +276,8 @@ impl<'a> Server<'a> {
         };
         let map = Arc::new(map);
         introduce(self.ros, self.environment, &map, configuration);
-        warn_of_too_small_map(configuration, &map);
-        let estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
+        let mut estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
+        estimator.warn_of_too_small_map(configuration);
         self.work = Work::Ready(Box::new(estimator));
         Ok(())
     }

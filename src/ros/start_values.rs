@@ -122,6 +122,16 @@ pub fn start_values(
 }
 
 impl StartValues {
+    /// Leaves out the quality of service of all topics but these, and warns of what was asked of the others.
+    pub fn leave_topics(&mut self, opened: &[String]) {
+        for name in self.qos.leave(opened) {
+            self.warnings.push(format!(
+                "parameter {:?} has no effect: as configured the node does not open that topic",
+                clip(&name)
+            ));
+        }
+    }
+
     fn set(&mut self, name: &str, value: ParameterValue) -> Result<(), StartValueError> {
         if !name.starts_with(qos_overrides::PREFIX) {
             return Ok(self.parameters.set(name, value)?);
@@ -269,6 +279,17 @@ mod tests {
             found.warnings[0].contains("/image"),
             "{}",
             found.warnings[0]
+        );
+
+        let mut found = found;
+        found.leave_topics(&["/pose".to_owned()]);
+        assert_eq!(found.warnings.len(), 1, "it is open");
+        found.leave_topics(&[]);
+        assert_eq!(found.qos.iter().count(), 0);
+        assert!(
+            found.warnings[1].contains("/pose.publisher.depth"),
+            "{}",
+            found.warnings[1]
         );
 
         let given = arguments(&["-p", "qos_overrides./pose.publisher.depth:=none"]);

@@ -61,8 +61,14 @@ class Process:
     """A running program, its standard error kept in a file."""
 
     def __init__(
-        self, command: list[str], domain: int, directory: Path, environment: dict[str, str]
+        self,
+        command: list[str],
+        domain: int,
+        directory: Path,
+        environment: dict[str, str],
+        output: int | None = None,
     ) -> None:
+        """Starts it; `output`: where it prints to instead of `log`."""
         directory.mkdir(parents=True, exist_ok=True)
         self.name = Path(command[0]).name
         self._log = directory / f"{self.name}.stderr"
@@ -73,8 +79,8 @@ class Process:
                 cwd=directory,
                 env=child_environment(domain) | environment,
                 stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
+                stdout=log if output is None else output,
+                stderr=log if output is None else output,
             )
 
     @property

@@ -1,16 +1,17 @@
-"""Faults around the node, each provoked and cleared: one log line at either end, `/diagnostics` in between.
+"""Faults around the node, each provoked and cleared: one log line at either end, `/diagnostics` in between."""
 
-`dropped_output` is not among them: the middleware refuses a sample only after 8192 unacknowledged ones.
-"""
-
-from collections.abc import Callable
+import signal
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import String
@@ -28,6 +29,11 @@ PATIENCE_S = 20.0
 STEADY_S = 5.0
 FAR_AHEAD = 1_000_000
 SIMULATED_S = 1000
+
+# A subscriber that is stopped acknowledges nothing. The middleware keeps 8192 samples for it, and forgets it 20 s
+# after its last sign of life: this many at a time fill that in a few seconds.
+FLOOD = 50
+FLOOD_PACE_S = 0.01
 
 RATES = {"frame_rate_hz", "camera_info_rate_hz", "estimate_rate_hz"}
 
@@ -207,6 +213,26 @@ def turn_clock(by_s: int) -> Callable[[Scene], None]:
     return provoke
 
 
+def send_undecodable(scene: Scene) -> None:
+    # As from a definition with a field less at the end.
+    both(scene)
+    good = Scene.message
+    scene.message = lambda topic: (
+        serialize_message(good(scene, topic))[:-5]
+        if topic == "/feature_points"
+        else good(scene, topic)
+    )
+
+
+def send_decodable(scene: Scene) -> None:
+    del scene.message
+
+
+def stop_clock(scene: Scene) -> None:
+    turn_clock(0)(scene)
+    scene.hush("/clock")
+
+
 def nothing(scene: Scene) -> None:
     """What is over by itself."""
 
@@ -283,6 +309,19 @@ CASES = {
     "stamps go far ahead": Case("stamp_jump", "ahead by", jump(10_000), nothing),
     "clock goes back": Case("clock_jump", "back by", turn_clock(-500), nothing, SIM_TIME),
     "clock goes far ahead": Case("clock_jump", "ahead by", turn_clock(5000), nothing, SIM_TIME),
+    "detector of another definition": Case(
+        "undecodable",
+        "a sample of feature_points cannot be decoded",
+        send_undecodable,
+        send_decodable,
+    ),
+    "clock stops": Case(
+        "no_clock",
+        "/clock has stopped",
+        stop_clock,
+        lambda scene: scene.speak("/clock"),
+        SIM_TIME,
+    ),
     "no clock": Case(
         "no_clock", "no /clock has come", nothing, lambda scene: scene.speak("/clock"), SIM_TIME
     ),
@@ -325,6 +364,49 @@ def test_a_fault_is_said_when_it_begins_and_ends_and_shown_in_between(
     assert "panicked" not in scene.process.log
 
 
+@pytest.fixture
+def subscriber(domain: int, tmp_path: Path) -> Iterator[Process]:
+    """Another process that hears `/status`, and says when it does."""
+    code = (
+        "import rclpy; from tanker_pose.msg import EstimatorStatus\n"
+        f"rclpy.init(domain_id={domain}); node = rclpy.create_node('subscriber')\n"
+        "heard = lambda message: print('heard', flush=True)\n"
+        "node.create_subscription(EstimatorStatus, '/status', heard, 10); rclpy.spin(node)"
+    )
+    process = Process([sys.executable, "-c", code], domain, tmp_path / "subscriber", {})
+    yield process
+    process.kill_if_running()
+
+
+def test_a_subscriber_that_is_stopped_costs_messages_only_when_the_window_is_full(
+    make_scene: Callable[..., Scene], subscriber: Process
+) -> None:
+    scene = make_scene()
+    scene.speak("/feature_points")
+    scene.step_until(lambda: "heard" in subscriber.log, "the subscriber to hear")
+    # Without a stamp they are refused, and cost nothing to make.
+    empty = FeaturePointArray()
+
+    def flood() -> None:
+        for _ in range(FLOOD):
+            scene.publishers["/feature_points"].publish(empty)
+            scene.peer.spin_for(FLOOD_PACE_S / FLOOD)
+
+    subscriber.send(signal.SIGSTOP)
+    try:
+        scene.step = flood
+        scene.step_until(lambda: "/status" in (scene.fault("dropped_output") or ""), "a drop")
+        (line,) = scene.lines("dropped_output: ")
+        assert "[WARN]" in line and "/status: a subscriber does not keep up" in line
+    finally:
+        subscriber.send(signal.SIGCONT)
+    del scene.step
+    scene.step_until(lambda: scene.fault("dropped_output") == "", "the end of the drops")
+    (line,) = scene.lines("dropped_output is over after")
+    assert "[INFO]" in line
+    assert len(scene.lines("dropped_output: ")) == 1, scene.process.log
+
+
 def test_a_healthy_node_reports_rates_and_latencies_and_no_faults(
     make_scene: Callable[..., Scene],
 ) -> None:
@@ -344,7 +426,6 @@ def test_a_healthy_node_reports_rates_and_latencies_and_no_faults(
     assert values["window_s"] == "10"
     assert 0.0 < float(values["latency_p50_ms"]) <= float(values["latency_p99_ms"]) < 1e3
     assert 0.0 < float(values["image_age_p50_ms"]) <= float(values["image_age_p99_ms"]) < 1e4
-
 
 
 def stamped_now(message, clock):

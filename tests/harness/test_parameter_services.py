@@ -202,11 +202,11 @@ def test_changes_are_told_to_all(start_node: StartNode, peer: Peer) -> None:
 
     client.set(min_points=2, max_outliers=2)
     client.set_atomically(min_points=4, max_outliers=7)
-    client.set_atomically(min_points=4, max_outliers=1)
+    client.set_atomically(min_points=4, marker_map="paper", max_outliers=1)
     expected = [{"max_outliers": 2}, {"min_points": 4, "max_outliers": 1}]
     peer.spin_until(lambda: told()[-1] == expected[-1], "the event of the atomic set")
 
-    assert told()[-2:] == expected, "refused values are not told"
+    assert told()[-2:] == expected, "refused values are not told, nor one that is fixed and stays"
     assert all(not e.new_parameters and not e.deleted_parameters for e in events)
 
 

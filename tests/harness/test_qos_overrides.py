@@ -10,6 +10,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from harness import messages
 from harness.conftest import StartEstimator, StartNode
 from harness.peer import Peer
+from harness.test_parameter_services import Client
 from harness.waiting import wait_until
 
 TYPES = {
@@ -112,6 +113,23 @@ def test_a_bad_override_stops_the_node_with_expected_and_got(
     assert name in node.log
     assert expected in node.log and got in node.log
     assert "panicked" not in node.log
+
+
+def test_only_topics_that_are_open_are_listed_and_overrides_of_others_are_warned_of(
+    start_node: StartNode, peer: Peer
+) -> None:
+    node = start_node(
+        *override("/tf", "depth", 1),
+        *override("/status", "reliability", "system_default"),
+    )
+    names = Client(peer).names(["qos_overrides"])
+
+    topics = {name.removeprefix("qos_overrides.").split(".")[0] for name in names}
+    assert topics == {
+        "/feature_points", "/camera_info", "/pose", "/odometry", "/status", "/diagnostics"
+    }
+    assert "qos_overrides./tf.publisher.depth\" has no effect" in node.log
+    assert endpoint(peer, "/status").qos_profile.reliability == ReliabilityPolicy.RELIABLE
 
 
 def test_an_override_of_a_foreign_topic_is_warned_of(

@@ -22,24 +22,28 @@ pub enum Fault {
     FrameMismatch,
     /// Stamps of detections go back, or far ahead.
     StampJump,
-    /// The simulated time goes back, or far ahead.
+    /// The simulated time goes back, or far ahead, or the system's back.
     ClockJump,
     /// Simulated time is wanted, and none comes.
     NoClock,
+    /// Samples came that do not decode.
+    Undecodable,
+    /// More samples waited than the topic's depth.
+    LostInput,
     /// Something could not be published.
     DroppedOutput,
 }
 
 /// How long a single event counts as lasting.
 const EVENT: Duration = Duration::from_secs(3);
-/// How long a fault that frames show lasts without frames.
+/// How long a fault that samples show lasts without samples.
 const SHOWN_BY_FRAMES: Duration = Duration::from_secs(10);
-/// How long it lasts once a frame shows that it is over: two detectors may take turns.
+/// How long it lasts once a sample shows that it is over: two detectors may take turns.
 const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -50,6 +54,8 @@ impl Fault {
         Self::StampJump,
         Self::ClockJump,
         Self::NoClock,
+        Self::Undecodable,
+        Self::LostInput,
         Self::DroppedOutput,
     ];
 
@@ -67,6 +73,8 @@ impl Fault {
             Self::StampJump => "stamp_jump",
             Self::ClockJump => "clock_jump",
             Self::NoClock => "no_clock",
+            Self::Undecodable => "undecodable",
+            Self::LostInput => "lost_input",
             Self::DroppedOutput => "dropped_output",
         }
     }
@@ -74,8 +82,8 @@ impl Fault {
     /// Returns how long it lasts after it was last seen.
     const fn lasts(self) -> Duration {
         match self {
-            Self::StampJump | Self::ClockJump | Self::DroppedOutput => EVENT,
-            Self::NoCameraInfo | Self::FrameMismatch => SHOWN_BY_FRAMES,
+            Self::StampJump | Self::ClockJump | Self::LostInput | Self::DroppedOutput => EVENT,
+            Self::NoCameraInfo | Self::FrameMismatch | Self::Undecodable => SHOWN_BY_FRAMES,
             // Looked for every second.
             _ => Duration::ZERO,
         }
@@ -126,6 +134,17 @@ impl Faults {
     /// Takes note that a fault seems to be over.
     pub fn end(&mut self, fault: Fault) {
         for ((_, _), open) in self.open.iter_mut().filter(|((kind, _), _)| *kind == fault) {
+            open.over = true;
+        }
+    }
+
+    /// Takes note that a fault of something of which there are many seems to be over.
+    pub fn end_of(&mut self, fault: Fault, of: &str) {
+        // Asked for every sample, and nearly always for nothing.
+        if self.open.is_empty() {
+            return;
+        }
+        if let Some(open) = self.open.get_mut(&(fault, of.to_owned())) {
             open.over = true;
         }
     }

@@ -1,9 +1,9 @@
 //! Notices what is wrong around the node, from what arrives, what is refused and what the graph holds.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use super::{Fault, Faults, Jumps, Latency};
-use crate::pipeline::OutcomeCode;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
 
@@ -11,6 +11,8 @@ use crate::ros::messages::Time;
 const SILENCE: Duration = Duration::from_secs(5);
 /// A camera info counts as steady after so many seconds with one in each; one that is latched never is.
 const STEADY_S: u32 = 3;
+/// How long detections may come before the camera info does, at a start.
+const GRACE: Duration = Duration::from_secs(2);
 /// Without detections and publishers of them for so long, that is said.
 const WAIT: Duration = Duration::from_secs(3);
 /// Most ends of others that are named; a strange graph may have any number.
@@ -34,6 +36,11 @@ impl Arrivals {
     }
 
     fn on_second(&mut self, publishers: usize, now: Instant) {
+        if publishers > 0 && self.heard_since.is_none() {
+            // Begun anew, and perhaps as one that is sent only once.
+            self.steady_s = 0;
+            self.was_steady = false;
+        }
         self.steady_s = if self.this_second {
             self.steady_s.saturating_add(1)
         } else {
@@ -67,14 +74,25 @@ fn is_long(since: Instant, now: Instant) -> bool {
     now.saturating_duration_since(since) >= SILENCE
 }
 
+/// How long simulated time has not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClockSilence {
+    /// When the last one came, or since when it is wanted.
+    pub since: Instant,
+    /// Whether one ever came.
+    pub ever: bool,
+}
+
 /// What a second brings beside the messages.
 pub struct Second<'a> {
     /// The other ends of the node's topics.
     pub graph: &'a Graph,
     /// How `/clock` jumped, if it did.
     pub clock_jump: Option<String>,
-    /// Whether simulated time is wanted and none has come.
-    pub clock_missing: bool,
+    /// What is to be said of the system's clock.
+    pub system_clock: Option<String>,
+    /// Since when no simulated time has come, if it is wanted.
+    pub clock_silence: Option<ClockSilence>,
     /// Topics on which something was dropped, and why.
     pub dropped: Vec<(String, String)>,
 }
@@ -94,8 +112,16 @@ pub struct Watch {
     detections: Arrivals,
     camera: Arrivals,
     stamps: Jumps,
-    clock_missing_since: Option<Instant>,
     waiting_said: bool,
+    without_camera: Option<WithoutCamera>,
+}
+
+/// Refusals for want of a camera info.
+#[derive(Debug)]
+struct WithoutCamera {
+    since: Instant,
+    /// The latest one that was not passed on.
+    latest: Option<String>,
 }
 
 impl Watch {
@@ -112,8 +138,8 @@ impl Watch {
             detections: Arrivals::default(),
             camera: Arrivals::default(),
             stamps: Jumps::default(),
-            clock_missing_since: None,
             waiting_said: false,
+            without_camera: None,
         }
     }
 
@@ -125,7 +151,33 @@ impl Watch {
     /// Takes note that a camera info came.
     pub fn on_camera_info(&mut self, now: Instant) {
         self.camera.take(now);
+        self.without_camera = None;
         self.faults.end(Fault::NoCameraInfo);
+    }
+
+    /// Takes note of a sample of `topic` that could be decoded.
+    pub fn on_decoded(&mut self, topic: &str) {
+        self.faults.end_of(Fault::Undecodable, topic);
+    }
+
+    /// Takes note of a sample of `topic` that could not.
+    pub fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display, now: Instant) {
+        let words = format!(
+            "a sample of {topic} cannot be decoded, its publisher may be built with another definition of its type: \
+             {error}"
+        );
+        self.faults.see_of(Fault::Undecodable, topic, &words, now);
+    }
+
+    /// Takes note of samples of `topic` that were passed over.
+    pub fn on_lost(&mut self, topic: &str, count: u64, now: Instant) {
+        if count > 0 {
+            let words = format!(
+                "{count} sample(s) of {topic} were passed over within a second: the node could not run, or they come \
+                 faster than it takes them"
+            );
+            self.faults.see_of(Fault::LostInput, topic, &words, now);
+        }
     }
 
     /// Takes note of an image from the camera's frame.
@@ -138,15 +190,20 @@ impl Watch {
         }
     }
 
-    /// Takes note of a refusal; returns whether it is a fault of the surroundings, and so is said here.
-    pub fn on_refusal(&mut self, outcome: OutcomeCode, words: &str, now: Instant) -> bool {
-        let fault = match outcome {
-            OutcomeCode::NoCameraInfo => Fault::NoCameraInfo,
-            OutcomeCode::FrameMismatch => Fault::FrameMismatch,
-            _ => return false,
-        };
+    /// Takes note of a refusal for a fault of the surroundings.
+    pub fn on_refusal(&mut self, fault: Fault, words: &str, now: Instant) {
+        if fault == Fault::NoCameraInfo {
+            let without = self.without_camera.get_or_insert(WithoutCamera {
+                since: now,
+                latest: None,
+            });
+            if now.saturating_duration_since(without.since) < GRACE {
+                without.latest = Some(words.to_owned());
+                return;
+            }
+            without.latest = None;
+        }
         self.faults.see(fault, words, now);
-        true
     }
 
     /// Looks for faults once a second.
@@ -162,8 +219,17 @@ impl Watch {
             };
             self.faults.see_of(fault, words, words, now);
         }
+        if let Some(without) = &mut self.without_camera
+            && now.saturating_duration_since(without.since) >= GRACE
+            && let Some(words) = without.latest.take()
+        {
+            self.faults.see(Fault::NoCameraInfo, &words, now);
+        }
         self.watch_inputs(detectors, cameras, now);
-        self.watch_clock(second.clock_jump, second.clock_missing, now);
+        if let Some(words) = second.system_clock {
+            self.faults.see_of(Fault::ClockJump, "system", &words, now);
+        }
+        self.watch_clock(second.clock_jump, second.clock_silence, now);
         for (topic, reason) in second.dropped {
             let words = format!("not all is published on {topic}: {reason}");
             self.faults
@@ -225,21 +291,17 @@ impl Watch {
         }
     }
 
-    fn watch_clock(&mut self, jump: Option<String>, missing: bool, now: Instant) {
+    fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
         if let Some(jump) = jump {
             let words = format!("/clock went {jump}");
             self.faults.see(Fault::ClockJump, &words, now);
         }
-        self.clock_missing_since = if missing {
-            self.clock_missing_since.or(Some(now))
-        } else {
-            None
-        };
-        if self
-            .clock_missing_since
-            .is_some_and(|since| is_long(since, now))
-        {
-            let words = "use_sim_time is set, but no /clock has come: the node's time is zero";
+        if let Some(silence) = silence.filter(|silence| is_long(silence.since, now)) {
+            let words = if silence.ever {
+                "use_sim_time is set, but /clock has stopped: the node's time stands still"
+            } else {
+                "use_sim_time is set, but no /clock has come: the node's time is zero"
+            };
             self.faults.see(Fault::NoClock, words, now);
         }
     }
@@ -253,6 +315,7 @@ mod tests {
     struct Scene {
         watch: Watch,
         graph: Graph,
+        clock: Option<ClockSilence>,
         now: Instant,
     }
 
@@ -262,6 +325,7 @@ mod tests {
             Self {
                 watch: Watch::new("/points".into(), "/camera".into(), now),
                 graph: Graph::default(),
+                clock: None,
                 now,
             }
         }
@@ -283,7 +347,8 @@ mod tests {
                 let second = Second {
                     graph: &self.graph,
                     clock_jump: None,
-                    clock_missing: false,
+                    system_clock: None,
+                    clock_silence: self.clock,
                     dropped: Vec::new(),
                 };
                 self.watch.on_second(second, self.now);
@@ -325,15 +390,60 @@ mod tests {
     }
 
     #[test]
+    fn simulated_time_that_never_comes_or_stops_is_a_fault_until_it_comes() {
+        let mut scene = Scene::new();
+        for ever in [false, true] {
+            let since = scene.now;
+            scene.clock = Some(ClockSilence { since, ever });
+            assert_eq!(scene.pass(4, false, false), []);
+            assert_eq!(scene.pass(1, false, false), [Fault::NoClock]);
+            let since = scene.now;
+            scene.clock = Some(ClockSilence { since, ever: true });
+            assert_eq!(scene.pass(1, false, false), []);
+        }
+        scene.clock = None;
+        assert_eq!(
+            scene.pass(60, false, false),
+            [],
+            "time is the system's again"
+        );
+    }
+
+    #[test]
+    fn camera_that_begins_anew_may_send_once() {
+        let mut scene = Scene::new();
+        scene.publishers("/camera", 1);
+        assert_eq!(scene.pass(5, true, true), []);
+        scene.publishers("/camera", 0);
+        assert_eq!(scene.pass(4, true, false), []);
+        assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo], "gone");
+        scene.publishers("/camera", 1);
+        assert_eq!(scene.pass(1, true, true), []);
+        assert_eq!(scene.pass(60, true, false), [], "it may be latched now");
+        assert_eq!(scene.pass(3, true, true), []);
+        assert_eq!(scene.pass(5, true, false), [Fault::StaleCameraInfo]);
+    }
+
+    #[test]
+    fn camera_that_comes_a_moment_after_the_detections_is_no_fault() {
+        let mut scene = Scene::new();
+        scene
+            .watch
+            .on_refusal(Fault::NoCameraInfo, "no camera", scene.now);
+        assert_eq!(scene.pass(1, true, false), []);
+        assert_eq!(scene.pass(60, true, true), []);
+    }
+
+    #[test]
     fn refusals_for_the_surroundings_last_until_they_are_answered() {
         let mut scene = Scene::new();
         let (watch, now) = (&mut scene.watch, scene.now);
-        assert!(watch.on_refusal(OutcomeCode::NoCameraInfo, "no camera", now));
-        assert!(watch.on_refusal(OutcomeCode::FrameMismatch, "frames", now));
-        assert!(!watch.on_refusal(OutcomeCode::UnknownId, "id", now));
+        watch.on_refusal(Fault::NoCameraInfo, "no camera", now);
+        watch.on_refusal(Fault::FrameMismatch, "frames", now);
+        assert_eq!(scene.pass(1, true, false), [Fault::FrameMismatch]);
         let both = [Fault::NoCameraInfo, Fault::FrameMismatch];
-        assert_eq!(scene.pass(1, true, false), both);
-        assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
+        assert_eq!(scene.pass(1, true, false), both, "a camera may come late");
+        assert_eq!(scene.pass(2, true, true), [Fault::FrameMismatch]);
         assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
         scene.watch.on_image(Time { sec: 7, nanosec: 0 }, scene.now);
         assert_eq!(scene.pass(1, true, true), []);

@@ -106,7 +106,7 @@ impl SharedParameters {
         names.iter().map(describe).collect()
     }
 
-    /// Sets all of the parameters, or none. Returns what they are now, for the others to hear.
+    /// Sets all of the parameters, or none. Returns what those that can change are now, for the others to hear.
     ///
     /// # Errors
     /// The result that names the first parameter that cannot have its value, and why, or those that do not go
@@ -136,7 +136,9 @@ impl SharedParameters {
         let accepted = assignments
             .iter()
             .filter_map(|assignment| {
-                let value = changed.get(&assignment.name)?;
+                // Loaded with a file that holds all values: it stays as it is, and nothing has happened to it.
+                let is_fixed = ParameterSpec::find(&assignment.name)?.read_only;
+                let value = changed.get(&assignment.name).filter(|_| !is_fixed)?;
                 Some(parameter_message(&assignment.name, value))
             })
             .collect();
@@ -239,9 +241,10 @@ mod tests {
         }
         assert!(changes.try_recv().is_err(), "nothing has changed yet");
 
-        let change = [integer("max_outliers", 0), integer(DEPTH, 50)];
+        let same = parameter_message("marker_map", &ParameterValue::String("paper".into()));
+        let change = [integer("max_outliers", 0), integer(DEPTH, 50), same];
         assert_eq!(
-            shared.set(&change).expect("both are allowed"),
+            shared.set(&change).expect("all are allowed"),
             [change[0].clone()]
         );
         assert!(changes.try_recv().is_ok());

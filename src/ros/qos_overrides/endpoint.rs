@@ -8,6 +8,8 @@ use super::PREFIX;
 use crate::config::{Kind, ParameterValue};
 use crate::ros::participant::QosProfile;
 
+/// What ROS's files say for "as it is".
+const SYSTEM_DEFAULT: &str = "system_default";
 /// Most samples that a topic may keep.
 const DEEPEST: i64 = 10_000;
 /// Longest deadline that the wire holds, ns.
@@ -76,9 +78,9 @@ impl Policy {
             }
         }
         match self {
-            Self::Reliability => choice(&["reliable", "best_effort"]),
-            Self::Durability => choice(&["volatile", "transient_local"]),
-            Self::History => choice(&["keep_last", "keep_all"]),
+            Self::Reliability => choice(&["reliable", "best_effort", SYSTEM_DEFAULT]),
+            Self::Durability => choice(&["volatile", "transient_local", SYSTEM_DEFAULT]),
+            Self::History => choice(&["keep_last", "keep_all", SYSTEM_DEFAULT]),
             Self::Depth => integer(1, DEEPEST),
             Self::Deadline => integer(0, LONGEST_NS),
         }
@@ -167,6 +169,7 @@ impl Endpoint {
             return false;
         }
         match (policy, value) {
+            (_, ParameterValue::String(word)) if word == SYSTEM_DEFAULT => {}
             (Policy::Reliability, ParameterValue::String(word)) => {
                 // A full window never makes the node wait.
                 let when_full = WhenFull::Fail;

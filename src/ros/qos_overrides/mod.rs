@@ -56,13 +56,18 @@ pub struct QosParameter {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct QosOverrides {
     endpoints: Vec<Endpoint>,
+    /// Names of the parameters that were set.
+    given: Vec<String>,
 }
 
 impl QosOverrides {
     /// Returns the topics' own quality of service, nothing overridden yet.
     #[must_use]
     pub const fn new(endpoints: Vec<Endpoint>) -> Self {
-        Self { endpoints }
+        Self {
+            endpoints,
+            given: Vec::new(),
+        }
     }
 
     /// Overrides one policy of one topic; false when the node has no such topic, so that nothing is.
@@ -76,6 +81,7 @@ impl QosOverrides {
                 .find(|p| endpoint.name_of(*p) == name)
             {
                 if endpoint.set(policy, value) {
+                    self.given.push(name.to_owned());
                     return Ok(true);
                 }
                 return Err(QosOverrideError::Value {
@@ -94,6 +100,20 @@ impl QosOverrides {
                 prefix: format!("{PREFIX}{topic}.{}.", role.name()),
             }),
         }
+    }
+
+    /// Leaves out all topics but these; returns the names of parameters that were set for the others.
+    pub fn leave(&mut self, opened: &[String]) -> Vec<String> {
+        let is_open = |endpoint: &Endpoint| opened.contains(&endpoint.topic);
+        self.endpoints.retain(is_open);
+        let is_left = |name: &String| {
+            let of =
+                |endpoint: &Endpoint| name.starts_with(&format!("{PREFIX}{}.", endpoint.topic));
+            self.endpoints.iter().any(of)
+        };
+        let (left, without_effect) = self.given.drain(..).partition(is_left);
+        self.given = left;
+        without_effect
     }
 
     /// Returns the quality of service of a topic, `default` where it cannot be overridden.
@@ -178,6 +198,18 @@ mod tests {
     }
 
     #[test]
+    fn system_default_leaves_a_policy_as_it_is() {
+        let mut overrides = overrides();
+        for policy in ["reliability", "durability", "history"] {
+            let name = format!("qos_overrides./pose.publisher.{policy}");
+            assert_eq!(overrides.set(&name, &text("system_default")), Ok(true));
+        }
+        let default = reliable(50);
+        let other = sensor_data(1);
+        assert_eq!(overrides.profile("/pose", Role::Publisher, &other), default);
+    }
+
+    #[test]
     fn depth_survives_a_change_of_history_in_any_order() {
         for order in [["depth", "history"], ["history", "depth"]] {
             let mut overrides = overrides();
@@ -211,7 +243,7 @@ mod tests {
                 &text("sometimes")
             ),
             "parameter \"qos_overrides./pose.publisher.reliability\" must be \
-             one of reliable, best_effort, got \"sometimes\" (string)"
+             one of reliable, best_effort, system_default, got \"sometimes\" (string)"
         );
         assert_eq!(
             refusal(
