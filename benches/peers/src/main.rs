@@ -1,6 +1,7 @@
 //! Worker of the peers benchmark: ours and the crate `sqpnp`, driven over a pipe.
 //!
-//! `peers frames FILE` writes the frames for the workers in other languages; `peers` alone answers lines:
+//! `peers frames FILE` writes the frames for the workers in other languages; `peers ours` and `peers others` answer
+//! lines for our methods and for the rest, which are built with the profile that suits each best:
 //! `methods`, `time METHOD SIZE_INDEX` (ns per solve), `poses METHOD SIZE_INDEX` (one pose a line).
 
 mod frames;
@@ -35,7 +36,13 @@ fn main() {
         return;
     }
     let camera: &'static Camera = Box::leak(Box::new(paper_camera()));
+    let is_ours = match arguments.get(1).map(String::as_str) {
+        Some("ours") => true,
+        Some("others") => false,
+        _ => panic!("expected ours, others or frames FILE"),
+    };
     let mut methods = methods(all, camera);
+    methods.retain(|(name, _)| name.starts_with("ours_") == is_ours);
     for line in std::io::stdin().lock().lines() {
         let line = line.expect("the driver writes text");
         let words: Vec<&str> = line.split_whitespace().collect();
