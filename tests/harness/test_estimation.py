@@ -96,7 +96,8 @@ def test_exact_pixels_give_the_exact_pose_and_its_numbers(estimator: Estimator) 
 def test_the_covariance_is_that_of_the_stated_sigmas(
     estimator: Estimator, rng: np.random.Generator
 ) -> None:
-    sigmas = np.array([0.2, 0.4, 0.8, 1.6, 0.3, 0.6])
+    # None claims more than twice what the fifth best does: bolder ones are taken down to that.
+    sigmas = np.array([0.4, 0.8, 0.5, 1.6, 0.45, 0.7])
     pixels = paper.marker_pixels(paper.POSE)
     pixels = pixels + rng.normal(size=pixels.shape) * sigmas[:, None]
 
