@@ -16,9 +16,9 @@ pub(crate) const MAX_ITERATIONS: u16 = 50;
 const GAIN_TOLERANCE: f64 = 1e-6;
 /// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
-/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 3e-4 of
-/// themselves for the shipped maps, to 2 % for a flat target seen face on.
-const NEAR: f64 = 1e-3;
+/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to a thousandth of
+/// themselves for the shipped maps, to about 1 % for a flat target seen face on.
+const NEAR: f64 = 7e-4;
 /// Damping at which no step in any direction helps any more.
 const MAX_DAMPING: f64 = 1e9;
 
