@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,8 +12,21 @@ from pathlib import Path
 FIRST_DOMAIN = 1
 LAST_DOMAIN = 101
 _COUNT = LAST_DOMAIN - FIRST_DOMAIN + 1
+# Unicast discovery ports of a domain's first participants, RTPS 9.6.1: a node of somebody's listens there.
+_PARTICIPANTS = 4
 
 _next_offset = os.getpid()
+
+
+def _is_quiet(domain: int) -> bool:
+    """Whether no participant of this host listens in a domain: tests must not reconfigure somebody's node."""
+    for participant in range(_PARTICIPANTS):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("", 7400 + 250 * domain + 10 + 2 * participant))
+            except OSError:
+                return False
+    return True
 
 
 @contextmanager
@@ -29,6 +43,8 @@ def claimed_domain() -> Iterator[int]:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 continue
+            if not _is_quiet(domain):
+                continue
             yield domain
             return
-    raise RuntimeError(f"all {_COUNT} ROS domains are in use by other harness runs")
+    raise RuntimeError(f"all {_COUNT} ROS domains are in use")

@@ -8,6 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition, TransitionDescription, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RclpyParameter
 from rclpy.parameter_client import AsyncParameterClient
@@ -22,6 +23,8 @@ from harness.messages import key
 from harness.peer import Peer
 from harness.rotations import Array, about_y
 from harness.waiting import wait_until
+
+RCLError = rclpy_implementation.RCLError
 
 MANAGED = ("-p", "lifecycle:=true")
 SERVICES = {
@@ -55,7 +58,11 @@ class Manager:
 
     def change(self, transition: int = 0, label: str = "") -> bool:
         request = ChangeState.Request(transition=Transition(id=transition, label=label))
-        return self.peer.call(ChangeState, f"{self.node}/change_state", request).success
+        try:
+            return self.peer.call(ChangeState, f"{self.node}/change_state", request).success
+        except RCLError:
+            # Jazzy's rclpy raises in its own node where Kilted's answers that there is no such transition.
+            return False
 
     def state(self) -> str:
         response = self.peer.call(GetState, f"{self.node}/get_state", GetState.Request())
