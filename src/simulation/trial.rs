@@ -7,11 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use super::{Scene, paper_error};
 use crate::camera::{Camera, Ray};
 use crate::estimation::{
-    EstimateError, Estimator, EstimatorSettings, Iterated, Observation, iterate_accelerated,
-    linear_rotation,
+    EstimateError, Estimator, EstimatorSettings, Iterated, Observation, fixed_point,
+    iterate_accelerated, linear_rotation,
 };
 use crate::geometry::optical_from_body;
 
+/// rad; a step that turns by less is the last of an iteration that settles.
+const SETTLED: f64 = 1e-10;
+/// Steps after which an iteration counts as settled in any case.
+const MAX_ITERATIONS: u32 = 20_000;
 /// rad; two ends of an iteration closer than this are the same minimum.
 const SAME_MINIMUM: f64 = 1e-4;
 
@@ -57,25 +61,15 @@ impl Method {
 
 /// When the orthogonal iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stop {
-    /// rad; a step that turns less is the last.
-    pub tolerance_rad: f64,
-    /// No more steps than this.
-    pub max_iterations: u32,
-}
-
-impl Stop {
-    /// The fixed point, for all that the statistics can see.
-    pub const CONVERGED: Self = Self {
-        tolerance_rad: 1e-10,
-        max_iterations: 20_000,
-    };
-
-    /// No step: the position that belongs to the start.
-    const AT_ONCE: Self = Self {
-        tolerance_rad: 0.0,
-        max_iterations: 0,
-    };
+pub enum Stop {
+    /// Where it settles, for all that the statistics can see.
+    Converged,
+    /// With the first step that turns by less than this, rad.
+    SmallStep(f64),
+    /// With the step after which the attitude is nearer than this to where the iteration settles, rad.
+    NearTheEnd(f64),
+    /// After so many steps.
+    Steps(u32),
 }
 
 /// What one method made of one image.
@@ -147,7 +141,7 @@ impl Solver {
                 let frame = Frame::new(camera, observations)?;
                 let seed = linear_rotation(&frame.rays, &frame.markers)?;
                 let stop = match method {
-                    Method::LinearAlone => Stop::AT_ONCE, // only Eq. (13)
+                    Method::LinearAlone => Stop::Steps(0), // only Eq. (13)
                     _ => stop,
                 };
                 frame.iterate_from(&seed, stop)?
@@ -166,7 +160,7 @@ impl Solver {
         random: &mut impl Rng,
     ) -> Vec<Option<TrialError>> {
         let observations = scene.noisy_observations(sigma_px, random);
-        let settles = stop == Stop::CONVERGED && methods.iter().any(|m| m.iterates());
+        let settles = stop == Stop::Converged && methods.iter().any(|m| m.iterates());
         let from_truth = settles
             .then(|| {
                 Frame::new(scene.camera(), &observations)?
@@ -217,14 +211,62 @@ impl Frame {
     }
 
     fn iterate_from(&self, seed: &Rotation3<f64>, stop: Stop) -> Result<Iterated, EstimateError> {
+        match stop {
+            Stop::Converged => self.iterate(seed, SETTLED, MAX_ITERATIONS),
+            Stop::SmallStep(tolerance_rad) => self.iterate(seed, tolerance_rad, MAX_ITERATIONS),
+            Stop::Steps(steps) => self.iterate(seed, 0.0, steps),
+            Stop::NearTheEnd(distance_rad) => self.iterate_until_near(seed, distance_rad),
+        }
+    }
+
+    /// Halves the range of steps in which the attitude comes near the end: each step brings it nearer.
+    fn iterate_until_near(
+        &self,
+        seed: &Rotation3<f64>,
+        distance_rad: f64,
+    ) -> Result<Iterated, EstimateError> {
+        // A step is a small share of the distance that remains, the smaller the slower the iteration.
+        let settled = self.iterate(seed, distance_rad * 1e-2, MAX_ITERATIONS)?;
+        let end = fixed_point(&self.rays, &self.markers, &rotation_of(&settled))?;
+        let mut far = self.iterate(seed, 0.0, 0)?;
+        let mut near = settled;
+        while near.iterations - far.iterations > 1 {
+            let steps = (near.iterations - far.iterations) / 2;
+            let mut middle = self.iterate(&rotation_of(&far), 0.0, steps)?;
+            middle.iterations = far.iterations + steps;
+            let (now, last) = (rotation_of(&middle), rotation_of(&end));
+            if chord(&now, &last) < distance_rad {
+                near = middle;
+            } else {
+                far = middle;
+            }
+        }
+        Ok(near)
+    }
+
+    fn iterate(
+        &self,
+        seed: &Rotation3<f64>,
+        tolerance_rad: f64,
+        max_iterations: u32,
+    ) -> Result<Iterated, EstimateError> {
         iterate_accelerated(
             &self.rays,
             &self.markers,
             seed,
-            stop.tolerance_rad,
-            stop.max_iterations,
+            tolerance_rad,
+            max_iterations,
         )
     }
+}
+
+fn rotation_of(iterated: &Iterated) -> Rotation3<f64> {
+    iterated.camera_from_tanker.rotation.to_rotation_matrix()
+}
+
+/// rad for small ones; unlike the angle it resolves less than 1e-8.
+fn chord(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
+    (to.matrix() - from.matrix()).norm() / std::f64::consts::SQRT_2
 }
 
 #[cfg(test)]
@@ -238,7 +280,7 @@ mod tests {
         let errors = Solver::default().trial(
             &paper_scene(),
             1e-6,
-            Stop::CONVERGED,
+            Stop::Converged,
             &Method::ALL,
             &mut random,
         );

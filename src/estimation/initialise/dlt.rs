@@ -1,6 +1,6 @@
 //! `In_M1`: the camera matrix by linear least squares, its rotation part projected onto SO(3).
 
-use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, SMatrix, SVector};
+use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, SMatrix, SVector, Vector3, Vector4};
 
 use crate::camera::Ray;
 use crate::estimation::EstimateError;
@@ -18,9 +18,10 @@ const MIN_EIGENVALUE_SHARE: f64 = 1e-12;
 
 /// Returns the rotation part of `camera_from_tanker` from a normalised direct linear transform.
 ///
-/// Rays and markers are moved to their means and scaled to unit spread (Hartley), the smallest
-/// right singular vector of the `2n × 12` matrix gives the camera matrix, its sign is chosen so that
-/// the markers lie in front, and its left 3×3 part is projected onto the rotations.
+/// Rays are moved to their mean and scaled to unit spread (Hartley), markers are scaled to unit
+/// spread, the smallest right singular vector of the `2n × 12` matrix gives the camera matrix, its
+/// sign is chosen so that the markers lie in front, and its left 3×3 part is projected onto the
+/// rotations.
 ///
 /// # Inputs
 /// * `rays`: `n ≥ 6` undistorted points on the `z = 1` plane.
@@ -48,7 +49,7 @@ pub fn linear_rotation(
     let object = object_normaliser(markers_in_tanker);
     let mut normal = Matrix12::zeros();
     for (ray, marker) in rays.iter().zip(markers_in_tanker) {
-        let u = image * nalgebra::Vector3::new(ray.x, ray.y, 1.0);
+        let u = image * Vector3::new(ray.x, ray.y, 1.0);
         let x = object * marker.to_homogeneous();
         let mut rows = SMatrix::<f64, 2, 12>::zeros(); // Eq. (16)
         for i in 0..4 {
@@ -96,26 +97,11 @@ fn image_normaliser(rays: &[Ray]) -> Matrix3<f64> {
     Matrix3::new(s, 0.0, -s * x, 0.0, s, -s * y, 0.0, 0.0, 1.0)
 }
 
+/// Scale alone: the origin stays that of the tanker, as in the paper. Moved to the mean, the unit
+/// length of the solution weighs other entries, and the share of wrong minima changes.
 fn object_normaliser(markers: &[Point3<f64>]) -> Matrix4<f64> {
     let centre = mean(markers, |marker| marker);
     let spread = markers.iter().map(|p| (p - centre).norm()).sum::<f64>() / markers.len() as f64;
     let s = 3.0_f64.sqrt() / spread.max(f64::MIN_POSITIVE);
-    Matrix4::new(
-        s,
-        0.0,
-        0.0,
-        -s * centre.x, //
-        0.0,
-        s,
-        0.0,
-        -s * centre.y, //
-        0.0,
-        0.0,
-        s,
-        -s * centre.z, //
-        0.0,
-        0.0,
-        0.0,
-        1.0,
-    )
+    Matrix4::from_diagonal(&Vector4::new(s, s, s, 1.0))
 }

@@ -1,6 +1,6 @@
 //! The experiments that the paper shows as figures.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3, center};
 
 use super::{Experiment, SIGMA_PX, Setting, paper_markers, pose_41, pose_42, scene};
 use crate::simulation::{Method, pose_in_camera};
@@ -10,27 +10,33 @@ use crate::target::Marker;
 const BEST_METHODS: &[Method] = &[Method::NominalIterated, Method::MaximumLikelihood];
 
 impl Experiment {
-    /// Fig. 5: six to fourteen points, the added ones evenly between the ends of the fin, of the wings or
-    /// of the tail planes. The fin's foot is taken at the height of the tail planes below its top.
+    /// Fig. 5: six to fourteen points, the added ones evenly along the fin, or in pairs along both wings or
+    /// both tail planes from root to tip. The fin's foot is taken at the height of the tail planes below
+    /// its top, the root of the others halfway between the tips.
     #[must_use]
     pub fn number_of_points() -> Self {
         let paper = paper_markers("paper");
         let at = |id: u32| paper[id as usize - 1].marker_in_tanker;
         let top = at(5);
+        let foot = Point3::new(top.x, top.y, at(3).z);
         let structures = [
-            ("fin", Point3::new(top.x, top.y, at(3).z), top),
-            ("wings", at(1), at(2)),
-            ("tail planes", at(3), at(4)),
+            ("fin", foot, vec![top]),
+            ("wings", center(&at(1), &at(2)), vec![at(1), at(2)]),
+            ("tail planes", center(&at(3), &at(4)), vec![at(3), at(4)]),
         ];
         let mut settings = Vec::new();
-        for (name, from, to) in structures {
+        for (name, root, tips) in structures {
             for added in [0, 2, 4, 6, 8] {
+                let stations = added / tips.len();
+                let places = (1..=stations)
+                    .map(|k| k as f64 / (stations + 1) as f64)
+                    .flat_map(|share| tips.iter().map(move |tip| root + (tip - root) * share));
                 let mut markers = paper.clone();
-                markers.extend((1..=added).map(|k| Marker {
-                    id: 6 + k,
-                    marker_in_tanker: from + (to - from) * (f64::from(k) / f64::from(added + 1)),
+                markers.extend((7..).zip(places).map(|(id, marker_in_tanker)| Marker {
+                    id,
+                    marker_in_tanker,
                 }));
-                let count = f64::from(6 + added);
+                let count = markers.len() as f64;
                 settings.push(Setting::new(
                     name,
                     count,

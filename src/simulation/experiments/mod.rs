@@ -55,7 +55,7 @@ impl Setting {
             abscissa,
             scene,
             sigma_px,
-            stop: Stop::CONVERGED,
+            stop: Stop::Converged,
         }
     }
 

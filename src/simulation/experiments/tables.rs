@@ -32,20 +32,22 @@ impl Experiment {
         }
     }
 
-    /// How many steps the iteration takes until a step turns by less than a tolerance.
+    /// How many steps the iteration takes until it turns by less than a tolerance, and until it is so near
+    /// to its end.
     #[must_use]
     pub fn iterations() -> Self {
         let settings = MarkerMap::shipped_names()
-            .flat_map(|name| {
+            .flat_map(|map| [(map, "last step"), (map, "distance")])
+            .flat_map(|(map, name)| {
                 [1e-10, 1e-6, 1e-3].map(|tolerance_rad| Setting {
-                    stop: Stop {
-                        tolerance_rad,
-                        ..Stop::CONVERGED
+                    stop: match name {
+                        "distance" => Stop::NearTheEnd(tolerance_rad),
+                        _ => Stop::SmallStep(tolerance_rad),
                     },
                     ..Setting::new(
-                        name,
+                        format!("{map} {name}"),
                         tolerance_rad,
-                        scene(paper_markers(name), pose_41()),
+                        scene(paper_markers(map), pose_41()),
                         SIGMA_PX,
                     )
                 })
@@ -69,10 +71,7 @@ impl Experiment {
             .into_iter()
             .flat_map(|sigma_px| {
                 [0_u32, 1, 2, 5, 10, 20, 50, 100].map(|max_iterations| Setting {
-                    stop: Stop {
-                        tolerance_rad: 0.0,
-                        max_iterations,
-                    },
+                    stop: Stop::Steps(max_iterations),
                     ..Setting::new(
                         format!("{sigma_px} px"),
                         f64::from(max_iterations),

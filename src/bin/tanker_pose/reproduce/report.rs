@@ -8,6 +8,9 @@ use tanker_pose::simulation::{Method, PAPER_COORDINATES, PAPER_UNITS, Summary};
 
 use super::monte_carlo::{Outcome, Point};
 
+/// Columns of every table, which may be an experiment's abscissa too.
+const SETTING_COLUMNS: [&str; 2] = ["sigma_px", "points"];
+
 /// Returns one line for each setting and method; the bound is repeated on the lines of its setting.
 pub fn csv(outcome: &Outcome) -> String {
     let coordinates = |what: &str| {
@@ -19,32 +22,42 @@ pub fn csv(outcome: &Outcome) -> String {
             })
     };
     let mut text = format!(
-        "series,{},method,sigma_px,points,points_in_image,trials,solved{}{}{},rotation_rms_deg,\
+        "series,{}method,sigma_px,points,points_in_image,trials,solved{}{}{},rotation_rms_deg,\
          rotation_median_deg,rotation_bound_deg,position_rms_m,position_median_m,position_bound_m,\
          share_above_5_deg,share_other_minimum,iterations_median,iterations_p95\n",
-        outcome
-            .experiment
-            .abscissa
-            .replace("iterations", "max_iterations"),
+        own_abscissa(outcome).map_or_else(String::new, |name| format!("{name},")),
         coordinates("rms"),
         coordinates("median"),
         coordinates("bound"),
     );
     for point in &outcome.points {
         for (method, summary) in &point.summaries {
-            line(&mut text, point, *method, summary).unwrap_or_default();
+            let abscissa = own_abscissa(outcome)
+                .map_or_else(String::new, |_| abscissa(point.setting.abscissa) + ",");
+            line(&mut text, point, &abscissa, *method, summary).unwrap_or_default();
         }
     }
     text
 }
 
-fn line(text: &mut String, point: &Point, method: Method, summary: &Summary) -> std::fmt::Result {
+/// Returns the name of the abscissa's column, none where every table has that column.
+fn own_abscissa(outcome: &Outcome) -> Option<String> {
+    let name = outcome.experiment.abscissa;
+    (!SETTING_COLUMNS.contains(&name)).then(|| name.replace("iterations", "max_iterations"))
+}
+
+fn line(
+    text: &mut String,
+    point: &Point,
+    abscissa: &str,
+    method: Method,
+    summary: &Summary,
+) -> std::fmt::Result {
     let setting = &point.setting;
     write!(
         text,
-        "{},{},{},{},{},{},{},{}",
+        "{},{abscissa}{},{},{},{},{},{}",
         setting.series,
-        abscissa(setting.abscissa),
         method.name(),
         setting.sigma_px,
         setting.scene.markers().len(),
@@ -81,7 +94,7 @@ pub fn text(outcome: &Outcome) -> String {
     let trials = outcome.points.first().and_then(|p| p.summaries.first());
     let mut table = format!(
         "{} ({} trials a line; RMS errors, angles in degrees, distances in m)\n\
-         {:<12} {:>13} {:<9}{:>8}{:>8}{:>8}{:>8}{:>8}{:>8}{:>10}{:>10}{:>9}{:>10}{:>9}{:>9}{:>7}\n",
+         {:<16} {:>13} {:<9}{:>8}{:>8}{:>8}{:>8}{:>8}{:>8}{:>10}{:>10}{:>9}{:>10}{:>9}{:>9}{:>7}\n",
         experiment.title,
         trials.map_or(0, |(_, summary)| summary.trials),
         "series",
@@ -123,7 +136,7 @@ fn text_line(point: &Point, method: Method, summary: &Summary) -> String {
         "-".to_owned()
     };
     format!(
-        "{:<12} {:>13} {:<9}{errors}{:>10}{:>10}{:>9.3}{:>10}{:>9.3}{other:>9}{steps:>7}",
+        "{:<16} {:>13} {:<9}{errors}{:>10}{:>10}{:>9.3}{:>10}{:>9.3}{other:>9}{steps:>7}",
         point.setting.series,
         abscissa(point.setting.abscissa),
         method.name(),

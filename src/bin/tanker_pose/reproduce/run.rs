@@ -56,7 +56,7 @@ impl Run {
                 let mut random = trial_generator(seed, STREAM, 0, index);
                 let seen = scene.noisy_observations(SIGMA_PX, &mut random);
                 let found = Method::ALL.map(|method| {
-                    let solved = solver.solve(method, scene.camera(), &seen, Stop::CONVERGED);
+                    let solved = solver.solve(method, scene.camera(), &seen, Stop::Converged);
                     solved.ok().map(|(pose, _)| paper_coordinates(&pose))
                 });
                 Image {
