@@ -51,6 +51,8 @@ pub(crate) trait Arithmetic: Copy {
         b: Self::Register,
         c: Self::Register,
     ) -> Self::Register;
+    /// The sum of each, side by side.
+    fn totals(self, fours: [Self::Register; 4]) -> Self::Register;
 }
 
 /// Four numbers with the way to compute with them, which takes no room.
@@ -74,16 +76,32 @@ impl<A: Arithmetic> Four<A> {
         Self::new(arithmetic, [value; LANES])
     }
 
+    /// Returns other numbers with the same arithmetic.
+    #[inline(always)]
+    pub(crate) fn another(self, lane: Lane) -> Self {
+        Self::new(self.arithmetic, lane)
+    }
+
     #[inline(always)]
     pub(crate) fn lane(self) -> Lane {
         self.arithmetic.store(self.register)
+    }
+
+    /// Returns the sum of each of four, side by side.
+    #[inline(always)]
+    pub(crate) fn totals(fours: [Self; 4]) -> Self {
+        let [a, b, c, d] = fours;
+        a.with(
+            a.arithmetic
+                .totals([a.register, b.register, c.register, d.register]),
+        )
     }
 
     /// Returns the sum of the four.
     #[inline(always)]
     pub(crate) fn total(self) -> f64 {
         let [a, b, c, d] = self.lane();
-        (a + c) + (b + d)
+        (a + b) + (c + d)
     }
 
     #[inline(always)]
@@ -146,8 +164,16 @@ impl<A: Arithmetic> Number for Four<A> {
 #[inline(always)]
 pub(crate) fn totals<A: Arithmetic, const N: usize>(fours: &[Four<A>; N]) -> [f64; N] {
     let mut totals = [0.0; N];
-    for (total, four) in totals.iter_mut().zip(fours) {
-        *total = four.total();
+    for (totals, fours) in totals.chunks_mut(LANES).zip(fours.chunks(LANES)) {
+        let last = fours.len() - 1;
+        let four = [
+            fours[0],
+            fours[1.min(last)],
+            fours[2.min(last)],
+            fours[last],
+        ];
+        let lane = Four::totals(four).lane();
+        totals.copy_from_slice(&lane[..totals.len()]);
     }
     totals
 }
@@ -234,6 +260,16 @@ impl Arithmetic for Plain {
     fn negate_mul_add(self, a: Lane, b: Lane, c: Lane) -> Lane {
         self.sub(c, self.mul(a, b))
     }
+
+    #[inline(always)]
+    fn totals(self, fours: [Lane; 4]) -> Lane {
+        let mut totals = [0.0; LANES];
+        for i in 0..LANES {
+            let [a, b, c, d] = fours[i];
+            totals[i] = (a + b) + (c + d);
+        }
+        totals
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -289,6 +325,16 @@ mod x86 {
         #[inline(always)]
         fn negate_mul_add(self, a: f64x4, b: f64x4, c: f64x4) -> f64x4 {
             self.negate_mul_add_e_f64s(a, b, c)
+        }
+
+        #[inline(always)]
+        fn totals(self, [a, b, c, d]: [f64x4; 4]) -> f64x4 {
+            // Neighbours first: lower and upper halves of a, b and of c, d.
+            let ab = self.avx._mm256_hadd_pd(cast(a), cast(b));
+            let cd = self.avx._mm256_hadd_pd(cast(c), cast(d));
+            let lower = self.avx._mm256_permute2f128_pd::<0x20>(ab, cd);
+            let upper = self.avx._mm256_permute2f128_pd::<0x31>(ab, cd);
+            cast(self.avx._mm256_add_pd(lower, upper))
         }
     }
 }

@@ -18,6 +18,7 @@
 
 mod ambiguity;
 mod collinearity;
+mod columns;
 mod covariance;
 mod estimator;
 mod exclude;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::collinearity::CollinearityCost;
+use super::columns::{Columns, Splats};
 use super::four::{Arithmetic, Kernel, vectorised};
 use super::symmetric3::{positive_inverse, times};
 use crate::geometry::{axial, cayley};
@@ -91,49 +92,61 @@ fn descend<A: Arithmetic>(arithmetic: A, descent: &Descent) -> Option<Minimum> {
         step_tolerance,
         limit,
     } = descent;
-    let mut rotation = *seed;
-    let mut y = cost.half_gradient(arithmetic, &rotation);
-    let mut value = rotation.matrix().dot(&y);
+    let mut here = Place::new(arithmetic, cost, Columns::new(arithmetic, seed.matrix()));
+    let ended = |place: &Place<A>, iterations, converged| Minimum {
+        rotation: Rotation3::from_matrix_unchecked(place.rotation.matrix()),
+        cost: place.value,
+        iterations,
+        converged,
+    };
     for iteration in 1..=MAX_ITERATIONS {
-        let NewtonStep { mut step, promise } = newton_step(arithmetic, cost, &rotation, &y);
-        if promise.is_some_and(|gain| value - gain > HOPELESS * limit) {
+        let NewtonStep { mut step, promise } = newton_step(arithmetic, cost, &here);
+        if promise.is_some_and(|gain| here.value - gain > HOPELESS * limit) {
             return None;
         }
         let mut halvings = 0;
         loop {
-            let trial = rotation * cayley(step);
-            let trial_y = cost.half_gradient(arithmetic, &trial);
-            let trial_value = trial.matrix().dot(&trial_y);
-            if trial_value <= value || step.norm() < TRUSTED_STEP {
-                (rotation, y, value) = (trial, trial_y, trial_value);
+            let turned = here.rotation.times(arithmetic, cayley(step).matrix());
+            let trial = Place::new(arithmetic, cost, turned);
+            if trial.value <= here.value || step.norm() < TRUSTED_STEP {
+                here = trial;
                 break;
             }
             halvings += 1;
             if halvings > MAX_HALVINGS {
-                return Some(Minimum {
-                    rotation,
-                    cost: value,
-                    iterations: iteration,
-                    converged: false,
-                });
+                return Some(ended(&here, iteration, false));
             }
             step *= 0.5;
         }
         if step.norm() < step_tolerance {
-            return Some(Minimum {
-                rotation,
-                cost: value,
-                iterations: iteration,
-                converged: true,
-            });
+            return Some(ended(&here, iteration, true));
         }
     }
-    Some(Minimum {
-        rotation,
-        cost: value,
-        iterations: MAX_ITERATIONS,
-        converged: false,
-    })
+    Some(ended(&here, MAX_ITERATIONS, false))
+}
+
+/// A rotation with the cost there.
+#[derive(Clone, Copy)]
+struct Place<A: Arithmetic> {
+    rotation: Columns<A>,
+    splats: Splats<A>,
+    /// `Y = mat(Ω r)`.
+    half_gradient: Columns<A>,
+    value: f64,
+}
+
+impl<A: Arithmetic> Place<A> {
+    #[inline(always)]
+    fn new(arithmetic: A, cost: &CollinearityCost, rotation: Columns<A>) -> Self {
+        let splats = rotation.splats(arithmetic);
+        let half_gradient = cost.half_gradient(arithmetic, &splats);
+        Self {
+            rotation,
+            splats,
+            half_gradient,
+            value: rotation.dot(half_gradient),
+        }
+    }
 }
 
 /// A step, and by how much the quadratic model says it lowers the cost; no promise where that model
@@ -147,13 +160,12 @@ struct NewtonStep {
 fn newton_step<A: Arithmetic>(
     arithmetic: A,
     cost: &CollinearityCost,
-    rotation: &Rotation3<f64>,
-    y: &Matrix3<f64>,
+    here: &Place<A>,
 ) -> NewtonStep {
-    let r = rotation.matrix();
-    let a = r.tr_mul(y);
+    let a = here.rotation.transpose_times(here.half_gradient);
     let gradient = axial(&a);
-    let hessian = cost.curvature(arithmetic, rotation) + (a + a.transpose()) * 0.5
+    let hessian = cost.curvature(arithmetic, here.rotation, &here.splats)
+        + (a + a.transpose()) * 0.5
         - Matrix3::identity() * a.trace();
     let (step, is_convex) = match solve_positive(&hessian, &gradient) {
         Some(solution) => (-solution, true),

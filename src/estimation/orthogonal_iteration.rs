@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 use super::EstimateError;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
+use super::columns::Columns;
 use super::four::Plain;
 use super::newton::{self, Minimum};
 use super::points::{Blocks, Points, mean};
@@ -125,8 +126,9 @@ pub fn iterate_accelerated(
     let mut iterations = 0;
     let mut converged = false;
     while iterations < max_iterations && !converged {
-        let next =
-            nearest_rotation(&(rotation.matrix() * scatter - cost.half_gradient(Plain, &rotation)));
+        let splats = Columns::new(Plain, rotation.matrix()).splats(Plain);
+        let half_gradient = cost.half_gradient(Plain, &splats).matrix();
+        let next = nearest_rotation(&(rotation.matrix() * scatter - half_gradient));
         iterations += 1;
         converged = turn(&rotation, &next) < tolerance_rad;
         rotation = next;

@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 
-use crate::estimation::collinearity::CollinearityCost;
-use crate::estimation::four::Plain;
+use crate::estimation::collinearity::{CollinearityCost, PRODUCTS, combined, products};
+use crate::estimation::four::{Arithmetic, Kernel, LANES, Lane, vectorised};
 use crate::estimation::newton::{self, Minimum};
 
 /// Rotations of the icosahedral group; none is farther than 44.5° from the nearest of them.
@@ -18,6 +18,26 @@ pub(crate) const MAX_MINIMA: usize = 4;
 const SAME_MINIMUM: f64 = 0.02;
 
 static ICOSAHEDRAL_GROUP: LazyLock<[Rotation3<f64>; GROUP_SIZE]> = LazyLock::new(icosahedral_group);
+/// The same, four rotations side by side.
+static FOURS: LazyLock<[FourRotations; GROUP_SIZE / LANES]> = LazyLock::new(|| {
+    std::array::from_fn(|four| {
+        let rotations = |lane: usize| ICOSAHEDRAL_GROUP[LANES * four + lane];
+        let of_lanes: [_; LANES] = std::array::from_fn(|lane| products(&rotations(lane)));
+        FourRotations {
+            products: std::array::from_fn(|i| of_lanes.map(|products| products[i])),
+            entries: std::array::from_fn(|i| {
+                std::array::from_fn(|lane| rotations(lane).matrix()[i])
+            }),
+        }
+    })
+});
+
+/// Numbers of four rotations side by side.
+struct FourRotations {
+    products: [Lane; PRODUCTS],
+    /// Column by column.
+    entries: [Lane; 9],
+}
 
 /// What the search found.
 pub(crate) struct Minima {
@@ -31,16 +51,7 @@ pub(crate) struct Minima {
 
 /// Returns the minima of the cost that descents from the best of sixty rotations end in.
 pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
-    // The best few starts, by insertion: no allocation, and sixty entries need no better sort.
-    let mut starts = [(f64::INFINITY, 0_usize); DESCENTS];
-    for (index, rotation) in ICOSAHEDRAL_GROUP.iter().enumerate() {
-        // A start behind the camera still descends to the front now and then, but rarely.
-        if cost.centre_in_camera(rotation).z > 0.0 {
-            insert(&mut starts, (cost.value(Plain, rotation), index), |a, b| {
-                a.0 < b.0
-            });
-        }
-    }
+    let starts = vectorised(BestStarts { cost });
     let mut found = Minima {
         in_front: [None; MAX_MINIMA],
         behind: None,
@@ -57,6 +68,34 @@ pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
         }
     }
     found
+}
+
+/// The best few of the group, with their costs; infinite where there is none.
+struct BestStarts<'a> {
+    cost: &'a CollinearityCost,
+}
+
+impl Kernel for BestStarts<'_> {
+    type Output = [(f64, usize); DESCENTS];
+
+    #[inline(always)]
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+        // By insertion: no allocation, and sixty entries need no better sort.
+        let mut starts = [(f64::INFINITY, 0_usize); DESCENTS];
+        let coefficients = self.cost.coefficients();
+        for (index, four) in FOURS.iter().enumerate() {
+            let values = combined(arithmetic, &coefficients, &four.products);
+            let depths = self.cost.depths(arithmetic, &four.entries);
+            for lane in 0..LANES {
+                // A start behind the camera still descends to the front now and then, but rarely.
+                if depths[lane] > 0.0 {
+                    let start = (values[lane], LANES * index + lane);
+                    insert(&mut starts, start, |a, b| a.0 < b.0);
+                }
+            }
+        }
+        starts
+    }
 }
 
 impl Minima {

@@ -158,14 +158,12 @@ impl Sums<f64> {
 impl<A: Arithmetic> Sums<Four<A>> {
     #[inline(always)]
     pub(super) fn total(&self) -> Sums<f64> {
+        let [[a, b, c], [d, e, f], [g, h, i]] = self.mixed;
+        let [a, b, c, d, e, f, g, h, i] = totals(&[a, b, c, d, e, f, g, h, i]);
         Sums {
             zero: 0.0,
             point: totals(&self.point),
-            mixed: [
-                totals(&self.mixed[0]),
-                totals(&self.mixed[1]),
-                totals(&self.mixed[2]),
-            ],
+            mixed: [[a, b, c], [d, e, f], [g, h, i]],
             turn: totals(&self.turn),
             slope: self.slope.total(),
         }
@@ -175,10 +173,21 @@ impl<A: Arithmetic> Sums<Four<A>> {
 impl<A: Arithmetic> SlopeSums<Four<A>> {
     #[inline(always)]
     pub(super) fn total(&self) -> SlopeSums<f64> {
+        let [a, b, c, d, e, f] = self.gradient;
+        let [a, b, c, d, e, f, chi_squared, squared_residuals_px] = totals(&[
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            self.chi_squared,
+            self.squared_residuals_px,
+        ]);
         SlopeSums {
-            gradient: totals(&self.gradient),
-            chi_squared: self.chi_squared.total(),
-            squared_residuals_px: self.squared_residuals_px.total(),
+            gradient: [a, b, c, d, e, f],
+            chi_squared,
+            squared_residuals_px,
         }
     }
 }
