@@ -81,17 +81,31 @@ impl Estimator {
         self.check_count(observations)?;
         let floored = with_sigma_floor(observations, self.settings.min_points);
         let observations = floored.as_deref().unwrap_or(observations);
-        let of_all = self.estimate_with_all(camera, observations, previous);
-        let max_outliers = self.settings.max_outliers;
-        let is_final = match &of_all {
+        let mut estimate = self.estimate_with_all(camera, observations, previous);
+        let is_final = match &estimate {
             Ok(solution) => solution.is_trusted(),
             // The lens says that there is no such pixel: a fault of the input, not a wrong detection.
             Err(error) => matches!(error, EstimateError::NoRay { .. }),
         };
-        if max_outliers == 0 || is_final {
-            return of_all;
+        if !is_final && self.settings.max_outliers > 0 {
+            let of_all = estimate.as_ref().ok();
+            if let Some(of_others) = self.leave_out(camera, observations, previous, of_all) {
+                estimate = Ok(of_others);
+            }
         }
-        let suspects = self.suspects(camera, observations, of_all.as_ref().ok(), previous);
+        estimate
+    }
+
+    /// Returns the pose that leaves out the fewest points; none when no hypothesis can be trusted.
+    #[cold]
+    fn leave_out(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        previous: Option<&Rotation3<f64>>,
+        of_all: Option<&Solution>,
+    ) -> Option<Solution> {
+        let suspects = self.suspects(camera, observations, of_all, previous);
         let judge = exclude::Judge {
             solve: |points: &[Observation]| {
                 self.check_count(points)?;
@@ -109,7 +123,7 @@ impl Estimator {
             // The last attitude may have been a wrong one; the nominal one is the user's word.
             is_prior_sure: self.settings.initialisation != Initialisation::Previous,
         };
-        exclude::search(&judge, observations, &suspects, max_outliers).map_or(of_all, Ok)
+        exclude::search(&judge, observations, &suspects, self.settings.max_outliers)
     }
 
     /// Checks that there are enough points, and enough that check each other.
@@ -241,12 +255,12 @@ impl Estimator {
             iterations: minimum.iterations.saturating_add(fit.iterations),
             initialisation,
         };
-        Ok(self.judge(problem, &judged))
+        self.judge(problem, &judged)
     }
 
     /// The best of all minima in front of the camera, and the second best as its rival.
     fn solve_globally(&self, problem: &Problem) -> Result<Solution, EstimateError> {
-        let minima = initialise::search(problem.cost, problem.step_tolerance());
+        let minima = initialise::search(problem);
         let mut iterations = minima.iterations;
         let mut ranking = Ranking::default();
         // With every minimum behind the camera, that is the reason.
@@ -281,20 +295,21 @@ impl Estimator {
             iterations,
             initialisation: Initialisation::Global,
         };
-        Ok(self.judge(problem, &judged))
+        self.judge(problem, &judged)
     }
 
     #[inline(always)]
-    fn judge(&self, problem: &Problem, judged: &Judged) -> Solution {
+    fn judge(&self, problem: &Problem, judged: &Judged) -> Result<Solution, EstimateError> {
         let fit = judged.fit;
+        let covariance = problem.covariance(fit)?;
         let residuals = 2 * problem.observations.len();
         let lever = fit.pose.rotation * problem.points.mean.coords;
-        Solution {
+        Ok(Solution {
             camera_from_tanker: problem.pose(&fit.pose),
-            covariance: PoseCovariance::from_point(
-                widened(problem, fit).as_ref().unwrap_or(&fit.covariance),
-                &lever,
-            ),
+            covariance: match widened(problem, fit, &covariance) {
+                None => PoseCovariance::from_point(&covariance, &lever),
+                Some(wider) => PoseCovariance::from_point(&wider, &lever),
+            },
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
             degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),
@@ -303,7 +318,7 @@ impl Estimator {
             initialisation: judged.initialisation,
             ambiguity: judged.ambiguity,
             excluded: Excluded::default(),
-        }
+        })
     }
 }
 
@@ -357,8 +372,18 @@ fn are_alike(observations: &[Observation], ratio: f64) -> bool {
     let (mut least, mut largest) = ([f64::INFINITY; 4], [0.0_f64; 4]);
     let (fours, rest) = observations.as_chunks::<4>();
     let mut look = |lane: usize, seen: &Observation| {
-        least[lane] = least[lane].min(seen.sigma_px);
-        largest[lane] = largest[lane].max(seen.sigma_px);
+        let sigma = seen.sigma_px;
+        // Finite, so plain comparisons do, which take one instruction each.
+        least[lane] = if sigma < least[lane] {
+            sigma
+        } else {
+            least[lane]
+        };
+        largest[lane] = if sigma > largest[lane] {
+            sigma
+        } else {
+            largest[lane]
+        };
     };
     // Four limits in turn, so that none waits for the one before it.
     for four in fours {

@@ -112,6 +112,15 @@ impl Solver {
         [turn[0], turn[1], turn[2], pulled(0), pulled(1), pulled(2)]
     }
 
+    /// Returns whether its numbers are numbers: one that is not makes their sum so.
+    #[inline(always)]
+    pub(crate) fn is_finite(&self) -> bool {
+        let [c, p] = [&self.turn_covariance, &self.position_inverse]
+            .map(|m| (m[0] + m[1]) + (m[2] + m[3]) + (m[4] + m[5]));
+        let lever = self.lever.as_flattened().iter().sum::<f64>();
+        (c + p + lever).is_finite()
+    }
+
     /// Returns `A⁻¹`, exactly symmetric, rotation before position.
     #[inline(always)]
     pub(crate) fn covariance(&self) -> Matrix6<f64> {

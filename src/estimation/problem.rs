@@ -1,7 +1,8 @@
 //! One frame's problem, prepared: points about their mean, the quadratic cost, fits from a seed.
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix6, Rotation3, Translation3, UnitQuaternion};
 
+use super::ambiguity;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
 use super::four::{Arithmetic, Kernel, Plain, vectorised};
@@ -156,7 +157,7 @@ impl<'a> Problem<'a> {
     /// Returns the final pose from a minimum of the cost, every point in front of the camera.
     pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
         let start = self.placed(rotation);
-        let fit = match self.refinement {
+        let mut fit = match self.refinement {
             Refinement::None => self.as_it_is(start),
             Refinement::MaximumLikelihood if self.camera.is_pinhole() => vectorised(PinholeFit {
                 problem: self,
@@ -167,10 +168,22 @@ impl<'a> Problem<'a> {
                     .map_err(|failure| self.explain(failure, &start))
             }
         };
-        if let Ok(fit) = &fit {
-            self.check_in_front(&fit.pose)?;
+        if let Ok(found) = &fit
+            && let Err(error) = self.check_in_front(&found.pose)
+        {
+            fit = Err(error);
         }
         fit
+    }
+
+    /// Returns the covariance of a fit, rotation before position of the markers' mean.
+    #[inline(always)]
+    pub(crate) fn covariance(&self, fit: &Fit) -> Result<Matrix6<f64>, EstimateError> {
+        match &fit.solver {
+            Some(solver) => Ok(solver.covariance()),
+            None => sandwich(self.camera, self.observations, &self.points.mean, &fit.pose)
+                .ok_or(EstimateError::SINGULAR),
+        }
     }
 
     /// Returns the pose with this rotation that suits the points best.
@@ -182,18 +195,16 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The paper's own estimate, with the covariance that it really has.
+    /// The paper's own estimate.
     fn as_it_is(&self, pose: CentredPose) -> Result<Fit, EstimateError> {
         let (chi_squared, squared_residuals_px) =
             refine::squared_residuals(&self.lens_residuals(), &pose)
                 .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
-        let covariance = sandwich(self.camera, self.observations, &self.points.mean, &pose)
-            .ok_or(EstimateError::SINGULAR)?;
         Ok(Fit {
             pose,
             chi_squared,
             squared_residuals_px,
-            covariance,
+            solver: None,
             iterations: 0,
         })
     }
@@ -251,6 +262,18 @@ impl<'a> Problem<'a> {
         let largest_depth = centre_depth + self.points.radius;
         (self.refinement == Refinement::MaximumLikelihood)
             .then_some(minimum.cost / (largest_depth * largest_depth))
+    }
+
+    /// Returns the cost above which a minimum does not count next to this one: its likelihood is negligible.
+    /// Infinite for the paper's cost, which is not weighted by the noise.
+    pub(crate) fn negligible_cost(&self, best: &newton::Minimum) -> f64 {
+        match self.refinement {
+            Refinement::None => f64::INFINITY,
+            Refinement::MaximumLikelihood => {
+                let depth = self.cost.centre_in_camera(&best.rotation).z.abs() + self.points.radius;
+                best.cost + ambiguity::NEGLIGIBLE * depth * depth
+            }
+        }
     }
 
     fn check_in_front(&self, pose: &CentredPose) -> Result<(), EstimateError> {

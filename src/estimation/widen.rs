@@ -24,18 +24,22 @@ const SLACK: f64 = 6.0;
 /// Returns a wider covariance of a fit, rotation before position, where the error is flatter than its
 /// curvature promises; none where the fit's own is honest.
 #[inline]
-pub(crate) fn widened(problem: &Problem, fit: &Fit) -> Option<Matrix6<f64>> {
-    let c = &fit.covariance;
+pub(crate) fn widened(
+    problem: &Problem,
+    fit: &Fit,
+    covariance: &Matrix6<f64>,
+) -> Option<Matrix6<f64>> {
+    let c = covariance;
     if c.m11 + c.m22 + c.m33 < SURE {
         return None;
     }
-    flattest(problem, fit)
+    flattest(problem, fit, covariance)
 }
 
 #[cold]
-fn flattest(problem: &Problem, fit: &Fit) -> Option<Matrix6<f64>> {
+fn flattest(problem: &Problem, fit: &Fit, covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
-    let information = upper_left(&fit.covariance).try_inverse()?;
+    let information = upper_left(covariance).try_inverse()?;
     let turn = (mirror_image(problem, pose)? * pose.rotation.inverse()).scaled_axis();
     let mut worst: Option<(f64, Vector3<f64>)> = None;
     for share in WAY {
@@ -55,9 +59,9 @@ fn flattest(problem: &Problem, fit: &Fit) -> Option<Matrix6<f64>> {
     let (factor, step) = worst?;
     // One sigma in the direction of the step, with all that moves with it: C + (k − 1) w wᵀ.
     let pull = information * step;
-    let sigma = fit.covariance * Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0)
-        / pull.dot(&step).sqrt();
-    let wide = fit.covariance + sigma * sigma.transpose() * (factor - 1.0);
+    let sigma =
+        covariance * Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0) / pull.dot(&step).sqrt();
+    let wide = covariance + sigma * sigma.transpose() * (factor - 1.0);
     wide.iter().all(|value| value.is_finite()).then_some(wide)
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 use crate::estimation::collinearity::{CollinearityCost, PRODUCTS, combined, products};
 use crate::estimation::four::{Arithmetic, Kernel, LANES, Lane, vectorised};
 use crate::estimation::newton::{self, Minimum};
+use crate::estimation::problem::Problem;
 
 /// Rotations of the icosahedral group; none is farther than 44.5° from the nearest of them.
 const GROUP_SIZE: usize = 60;
@@ -50,7 +51,11 @@ pub(crate) struct Minima {
 }
 
 /// Returns the minima of the cost that descents from the best of sixty rotations end in.
-pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
+///
+/// A descent that will clearly end where nothing counts any more, see [`Problem::negligible_cost`], is given up
+/// on the way.
+pub(crate) fn search(problem: &Problem) -> Minima {
+    let cost = problem.cost;
     let starts = vectorised(BestStarts { cost });
     let mut found = Minima {
         in_front: [None; MAX_MINIMA],
@@ -61,7 +66,12 @@ pub(crate) fn search(cost: &CollinearityCost, step_tolerance: f64) -> Minima {
         if value.is_infinite() {
             break;
         }
-        let minimum = newton::minimise(cost, &ICOSAHEDRAL_GROUP[index], step_tolerance);
+        let limit = found.in_front[0].map_or(f64::INFINITY, |best| problem.negligible_cost(&best));
+        let seed = &ICOSAHEDRAL_GROUP[index];
+        let step_tolerance = problem.step_tolerance();
+        let Some(minimum) = newton::minimise_below(cost, seed, step_tolerance, limit) else {
+            continue;
+        };
         found.iterations = found.iterations.saturating_add(minimum.iterations);
         if minimum.converged {
             found.keep(minimum, cost.centre_in_camera(&minimum.rotation).z > 0.0);
