@@ -56,7 +56,10 @@ pub(crate) trait Arithmetic: Copy {
 }
 
 /// Four numbers with the way to compute with them, which takes no room.
+///
+/// Aligned, as all lanes in memory should be: half of those that are not lie across two cache lines.
 #[derive(Clone, Copy)]
+#[repr(align(32))]
 pub(crate) struct Four<A: Arithmetic> {
     arithmetic: A,
     register: A::Register,

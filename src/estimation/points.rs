@@ -17,6 +17,7 @@ const MIN_WIDTH_SHARE: f64 = 1e-6;
 
 /// Four points. What is missing to four at the end has no weight and its marker lies in the mean.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(32))]
 pub(crate) struct Block {
     /// Marker from the markers' mean, tanker frame, m.
     pub(crate) marker: [Lane; 3],

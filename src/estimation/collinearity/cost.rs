@@ -10,6 +10,7 @@ use crate::estimation::symmetric3::inverse;
 
 /// The collinearity error as a function of the rotation alone.
 #[derive(Debug, Clone)]
+#[repr(align(32))]
 pub(crate) struct CollinearityCost {
     /// Columns of `Ω`, which is symmetric.
     omega: [[Lane; 3]; 9],

@@ -75,6 +75,7 @@ pub(super) const MONOMIALS: usize = 10;
 
 /// `Σ W m` for each monomial `m` of a marker.
 #[derive(Debug, Clone)]
+#[repr(align(32))]
 pub(crate) struct CollinearityMoments {
     /// The columns of each of these symmetric matrices.
     pub(super) columns: [[Lane; 3]; MONOMIALS],

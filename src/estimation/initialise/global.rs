@@ -34,6 +34,7 @@ static FOURS: LazyLock<[FourRotations; GROUP_SIZE / LANES]> = LazyLock::new(|| {
 });
 
 /// Numbers of four rotations side by side.
+#[repr(align(32))]
 struct FourRotations {
     products: [Lane; PRODUCTS],
     /// Column by column.
