@@ -68,10 +68,17 @@ impl<A: Arithmetic> PinholeResiduals<'_, A> {
     fn visit(&self, pose: &CentredPose, mut add: impl FnMut(Seen<A>)) -> bool {
         let pose = PoseInRegisters::new(self.arithmetic, pose);
         let mut nearest = [f64::INFINITY; LANES];
-        for block in self.points.blocks {
-            let (seen, depth) = pose.see(self.arithmetic, block);
-            add(seen);
-            let depth = depth.lane();
+        // A block ahead: its division runs while the sums of the one before are taken.
+        let blocks = self.points.blocks;
+        let Some(first) = blocks.first() else {
+            return false;
+        };
+        let mut next = pose.sight(self.arithmetic, first);
+        for (index, block) in blocks.iter().enumerate() {
+            let sight = next;
+            next = pose.sight(self.arithmetic, blocks.get(index + 1).unwrap_or(block));
+            add(pose.see(self.arithmetic, block, &sight));
+            let depth = sight.depth.lane();
             for i in 0..LANES {
                 nearest[i] = if depth[i] < nearest[i] {
                     depth[i]
@@ -83,6 +90,15 @@ impl<A: Arithmetic> PinholeResiduals<'_, A> {
         // A depth that is not a number makes the squared residuals so too.
         nearest.iter().all(|depth| *depth > 0.0)
     }
+}
+
+/// Where four points lie.
+#[derive(Clone, Copy)]
+struct Sight<A: Arithmetic> {
+    /// From the markers' mean, camera axes, m.
+    arm: [Four<A>; 3],
+    depth: Four<A>,
+    inverse_depth: Four<A>,
 }
 
 /// Each number of a pose four times.
@@ -109,9 +125,9 @@ impl<A: Arithmetic> PoseInRegisters<A> {
 }
 
 impl<A: Arithmetic> PoseInRegisters<A> {
-    /// Returns what the residuals of a block are made of, and its depths.
+    /// Returns where a block's points lie.
     #[inline(always)]
-    fn see(&self, arithmetic: A, block: &Block) -> (Seen<A>, Four<A>) {
+    fn sight(&self, arithmetic: A, block: &Block) -> Sight<A> {
         let load = |lane: &Lane| Four::new(arithmetic, *lane);
         let p = [
             load(&block.marker[0]),
@@ -120,10 +136,21 @@ impl<A: Arithmetic> PoseInRegisters<A> {
         ];
         let turned = |row: &[Four<A>; 3]| (row[0] * p[0]).plus(row[1], p[1]).plus(row[2], p[2]);
         let r = &self.rotation;
-        let a = [turned(&r[0]), turned(&r[1]), turned(&r[2])];
+        let arm = [turned(&r[0]), turned(&r[1]), turned(&r[2])];
+        let depth = arm[2] + self.centre_in_camera[2];
+        Sight {
+            arm,
+            depth,
+            inverse_depth: Four::splat(arithmetic, 1.0) / depth,
+        }
+    }
+
+    /// Returns what the residuals of a block are made of.
+    #[inline(always)]
+    fn see(&self, arithmetic: A, block: &Block, sight: &Sight<A>) -> Seen<A> {
+        let load = |lane: &Lane| Four::new(arithmetic, *lane);
+        let (a, inverse) = (sight.arm, sight.inverse_depth);
         let c = &self.centre_in_camera;
-        let depth = a[2] + c[2];
-        let inverse = Four::splat(arithmetic, 1.0) / depth;
         let (x, y) = ((a[0] + c[0]) * inverse, (a[1] + c[1]) * inverse);
         let [b11, _, b22] = &block.information;
         let (b11, b22) = (load(b11), load(b22));
@@ -136,7 +163,7 @@ impl<A: Arithmetic> PoseInRegisters<A> {
         let m33 = zero.minus(x, m13).minus(y, m23);
         let (s1, s2) = (e1 * rx, e2 * ry);
         let s3 = zero.minus(x, s1).minus(y, s2);
-        let seen = Seen {
+        Seen {
             arm: a,
             weight: Weight {
                 m11,
@@ -149,8 +176,7 @@ impl<A: Arithmetic> PoseInRegisters<A> {
             slope: [s1, s2, s3],
             squared: (b11 * rx * rx).plus(b22 * ry, ry),
             variance: load(&block.variance),
-        };
-        (seen, depth)
+        }
     }
 }
 
