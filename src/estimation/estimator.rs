@@ -369,33 +369,17 @@ fn with_sigma_floor(
 
 /// Returns whether no sigma is more than `ratio` times another: nearly always.
 fn are_alike(observations: &[Observation], ratio: f64) -> bool {
-    let (mut least, mut largest) = ([f64::INFINITY; 4], [0.0_f64; 4]);
-    let (fours, rest) = observations.as_chunks::<4>();
-    let mut look = |lane: usize, seen: &Observation| {
-        let sigma = seen.sigma_px;
-        // Finite, so plain comparisons do, which take one instruction each.
-        least[lane] = if sigma < least[lane] {
-            sigma
-        } else {
-            least[lane]
-        };
-        largest[lane] = if sigma > largest[lane] {
-            sigma
-        } else {
-            largest[lane]
-        };
+    let Some(first) = observations.first() else {
+        return true;
     };
-    // Four limits in turn, so that none waits for the one before it.
-    for four in fours {
-        for lane in 0..4 {
-            look(lane, &four[lane]);
-        }
+    // Near the first is near each other.
+    let (least, largest) = (first.sigma_px / ratio.sqrt(), first.sigma_px * ratio.sqrt());
+    let is_near = |seen: &Observation| seen.sigma_px >= least && seen.sigma_px <= largest;
+    observations.iter().all(is_near) || {
+        let sigmas = observations.iter().map(|seen| seen.sigma_px);
+        let least = sigmas.clone().fold(f64::INFINITY, f64::min);
+        sigmas.fold(0.0, f64::max) <= ratio * least
     }
-    for seen in rest {
-        look(0, seen);
-    }
-    let least = least.into_iter().fold(f64::INFINITY, f64::min);
-    largest.iter().all(|sigma| *sigma <= ratio * least)
 }
 
 /// Returns how many points are precise enough to check others: those whose sigma is at most

@@ -53,6 +53,8 @@ pub(crate) trait Arithmetic: Copy {
     ) -> Self::Register;
     /// The sum of each, side by side.
     fn totals(self, fours: [Self::Register; 4]) -> Self::Register;
+    /// The first of each, the second of each, and so on.
+    fn transposed(self, rows: [Self::Register; 4]) -> [Self::Register; 4];
 }
 
 /// Four numbers with the way to compute with them, which takes no room.
@@ -98,6 +100,16 @@ impl<A: Arithmetic> Four<A> {
             a.arithmetic
                 .totals([a.register, b.register, c.register, d.register]),
         )
+    }
+
+    /// Returns the first numbers of all four, the second ones, the third and the fourth.
+    #[inline(always)]
+    pub(crate) fn transposed(rows: [Self; 4]) -> [Self; 4] {
+        let [a, b, c, d] = rows;
+        let [first, second, third, fourth] = a
+            .arithmetic
+            .transposed([a.register, b.register, c.register, d.register]);
+        [a.with(first), a.with(second), a.with(third), a.with(fourth)]
     }
 
     /// Returns the sum of the four.
@@ -273,6 +285,15 @@ impl Arithmetic for Plain {
         }
         totals
     }
+
+    #[inline(always)]
+    fn transposed(self, rows: [Lane; 4]) -> [Lane; 4] {
+        let mut columns = rows;
+        for i in 0..LANES {
+            columns[i] = [rows[0][i], rows[1][i], rows[2][i], rows[3][i]];
+        }
+        columns
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -338,6 +359,20 @@ mod x86 {
             let lower = self.avx._mm256_permute2f128_pd::<0x20>(ab, cd);
             let upper = self.avx._mm256_permute2f128_pd::<0x31>(ab, cd);
             cast(self.avx._mm256_add_pd(lower, upper))
+        }
+
+        #[inline(always)]
+        fn transposed(self, [a, b, c, d]: [f64x4; 4]) -> [f64x4; 4] {
+            let [a, b, c, d] = [cast(a), cast(b), cast(c), cast(d)];
+            let avx = self.avx;
+            let (ab_even, ab_odd) = (avx._mm256_unpacklo_pd(a, b), avx._mm256_unpackhi_pd(a, b));
+            let (cd_even, cd_odd) = (avx._mm256_unpacklo_pd(c, d), avx._mm256_unpackhi_pd(c, d));
+            [
+                cast(avx._mm256_permute2f128_pd::<0x20>(ab_even, cd_even)),
+                cast(avx._mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd)),
+                cast(avx._mm256_permute2f128_pd::<0x31>(ab_even, cd_even)),
+                cast(avx._mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd)),
+            ]
         }
     }
 }

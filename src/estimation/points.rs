@@ -87,7 +87,7 @@ impl<'a> Points<'a> {
         observations: &[Observation],
         room: &'a mut Blocks,
     ) -> Result<Self, EstimateError> {
-        let mean = mean(observations, |seen| &seen.marker_in_tanker);
+        let mean = mean_marker(arithmetic, observations);
         room.clear();
         room.reserve(observations.len().div_ceil(LANES));
         let pinhole = camera.pinhole();
@@ -197,21 +197,17 @@ fn measure_four(
     let splat = |value| Four::splat(arithmetic, value);
     let load = |lane| Four::new(arithmetic, lane);
     let there = load(there);
-    for axis in 0..3 {
-        let marker = load([
-            seen[0].marker_in_tanker[axis],
-            seen[1].marker_in_tanker[axis],
-            seen[2].marker_in_tanker[axis],
-            seen[3].marker_in_tanker[axis],
-        ]);
-        block.marker[axis] = ((marker - splat(mean[axis])) * there).lane();
-    }
-    let u = load([
-        seen[0].pixel.u,
-        seen[1].pixel.u,
-        seen[2].pixel.u,
-        seen[3].pixel.u,
+    let [x, y, z, u] = Four::transposed([
+        marker_and_column(arithmetic, seen[0]),
+        marker_and_column(arithmetic, seen[1]),
+        marker_and_column(arithmetic, seen[2]),
+        marker_and_column(arithmetic, seen[3]),
     ]);
+    block.marker = [
+        ((x - splat(mean.x)) * there).lane(),
+        ((y - splat(mean.y)) * there).lane(),
+        ((z - splat(mean.z)) * there).lane(),
+    ];
     let v = load([
         seen[0].pixel.v,
         seen[1].pixel.v,
@@ -249,21 +245,35 @@ fn measure(camera: &Camera, seen: &Observation) -> Result<Measurement, EstimateE
     })
 }
 
-/// Returns the mean of some markers, m.
+/// Four numbers that stand side by side in an observation: marker and column.
 #[inline(always)]
-pub(crate) fn mean<T>(items: &[T], marker: impl Fn(&T) -> &Point3<f64>) -> Point3<f64> {
+fn marker_and_column<A: Arithmetic>(arithmetic: A, seen: &Observation) -> Four<A> {
+    let marker = &seen.marker_in_tanker;
+    Four::new(arithmetic, [marker.x, marker.y, marker.z, seen.pixel.u])
+}
+
+/// Returns the mean of the markers, m.
+#[inline(always)]
+fn mean_marker(arithmetic: impl Arithmetic, observations: &[Observation]) -> Point3<f64> {
     // Four sums in turn, so that no addition waits for the one before it.
-    let mut sums = [Vector3::zeros(); LANES];
-    let (fours, rest) = items.as_chunks::<LANES>();
+    let mut sums = [Four::splat(arithmetic, 0.0); 4];
+    let (fours, rest) = observations.as_chunks::<4>();
     for four in fours {
-        for lane in 0..LANES {
-            sums[lane] += marker(&four[lane]).coords;
+        for k in 0..4 {
+            sums[k] = sums[k] + marker_and_column(arithmetic, &four[k]);
         }
     }
-    for item in rest {
-        sums[0] += marker(item).coords;
+    for seen in rest {
+        sums[0] = sums[0] + marker_and_column(arithmetic, seen);
     }
-    Point3::from(((sums[0] + sums[1]) + (sums[2] + sums[3])) / items.len() as f64)
+    let [x, y, z, _] = ((sums[0] + sums[1]) + (sums[2] + sums[3])).lane();
+    Point3::new(x, y, z) / observations.len() as f64
+}
+
+/// Returns the mean of some markers, m.
+pub(crate) fn mean<T>(items: &[T], marker: impl Fn(&T) -> &Point3<f64>) -> Point3<f64> {
+    let sum: Vector3<f64> = items.iter().map(|item| marker(item).coords).sum();
+    Point3::from(sum / items.len() as f64)
 }
 
 #[inline(always)]

@@ -88,35 +88,32 @@ impl CollinearityMoments {
         let mut columns = [[[0.0; LANES]; 3]; MONOMIALS];
         let none = Four::splat(arithmetic, 0.0);
         // Without distortion, columns and rows do not mix and differ by a factor only.
-        match (weighting, points.row_by_column_information) {
-            (Weighting::Image, Some(ratio)) => {
-                let w11 = sums_of(arithmetic, points, weighting, 0);
-                let w13 = sums_of(arithmetic, points, weighting, 2);
-                let w23 = sums_of(arithmetic, points, weighting, 4);
-                let w33 = sums_of(arithmetic, points, weighting, 5);
-                let ratio = Four::splat(arithmetic, ratio);
-                for m in 0..MONOMIALS {
-                    columns[m] = [
-                        Four::totals([w11[m], none, w13[m], none]).lane(),
-                        Four::totals([none, w11[m] * ratio, w23[m], none]).lane(),
-                        Four::totals([w13[m], w23[m], w33[m], none]).lane(),
-                    ];
-                }
+        if let (Weighting::Image, Some(ratio)) = (weighting, points.row_by_column_information) {
+            let w11 = sums_of(arithmetic, points, weighting, 0);
+            let w13 = sums_of(arithmetic, points, weighting, 2);
+            let w23 = sums_of(arithmetic, points, weighting, 4);
+            let w33 = sums_of(arithmetic, points, weighting, 5);
+            let ratio = Four::splat(arithmetic, ratio);
+            for m in 0..MONOMIALS {
+                columns[m] = [
+                    Four::totals([w11[m], none, w13[m], none]).lane(),
+                    Four::totals([none, w11[m] * ratio, w23[m], none]).lane(),
+                    Four::totals([w13[m], w23[m], w33[m], none]).lane(),
+                ];
             }
-            _ => {
-                let w11 = sums_of(arithmetic, points, weighting, 0);
-                let w12 = sums_of(arithmetic, points, weighting, 1);
-                let w13 = sums_of(arithmetic, points, weighting, 2);
-                let w22 = sums_of(arithmetic, points, weighting, 3);
-                let w23 = sums_of(arithmetic, points, weighting, 4);
-                let w33 = sums_of(arithmetic, points, weighting, 5);
-                for m in 0..MONOMIALS {
-                    columns[m] = [
-                        Four::totals([w11[m], w12[m], w13[m], none]).lane(),
-                        Four::totals([w12[m], w22[m], w23[m], none]).lane(),
-                        Four::totals([w13[m], w23[m], w33[m], none]).lane(),
-                    ];
-                }
+        } else {
+            let w11 = sums_of(arithmetic, points, weighting, 0);
+            let w12 = sums_of(arithmetic, points, weighting, 1);
+            let w13 = sums_of(arithmetic, points, weighting, 2);
+            let w22 = sums_of(arithmetic, points, weighting, 3);
+            let w23 = sums_of(arithmetic, points, weighting, 4);
+            let w33 = sums_of(arithmetic, points, weighting, 5);
+            for m in 0..MONOMIALS {
+                columns[m] = [
+                    Four::totals([w11[m], w12[m], w13[m], none]).lane(),
+                    Four::totals([w12[m], w22[m], w23[m], none]).lane(),
+                    Four::totals([w13[m], w23[m], w33[m], none]).lane(),
+                ];
             }
         }
         Self { columns }
