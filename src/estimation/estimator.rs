@@ -1,6 +1,6 @@
 //! The one call that turns observations into a judged pose.
 
-use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
@@ -10,12 +10,11 @@ use super::points::INLINE_POINTS;
 use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
-use super::widen::widened;
+use super::widen::honest_covariance;
 use super::{
     EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Refinement, Solution,
 };
 use crate::camera::{Camera, Ray};
-use crate::geometry::PoseCovariance;
 
 /// rad; a subset that has turned farther from its prior has found a way to fit noise, not the tanker.
 const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -301,15 +300,14 @@ impl Estimator {
     #[inline(always)]
     fn judge(&self, problem: &Problem, judged: &Judged) -> Result<Solution, EstimateError> {
         let fit = judged.fit;
-        let covariance = problem.covariance(fit)?;
         let residuals = 2 * problem.observations.len();
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Ok(Solution {
-            camera_from_tanker: problem.pose(&fit.pose),
-            covariance: match widened(problem, fit, &covariance) {
-                None => PoseCovariance::from_point(&covariance, &lever),
-                Some(wider) => PoseCovariance::from_point(&wider, &lever),
-            },
+            camera_from_tanker: Isometry3::from_parts(
+                Translation3::from(fit.pose.centre_in_camera - lever),
+                UnitQuaternion::from_rotation_matrix(&fit.pose.rotation),
+            ),
+            covariance: honest_covariance(problem, fit, &lever)?,
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
             degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),

@@ -118,7 +118,7 @@ fn descend<A: Arithmetic>(arithmetic: A, descent: &Descent) -> Option<Minimum> {
             }
             step *= 0.5;
         }
-        if step.norm() < step_tolerance {
+        if step.norm_squared() < step_tolerance * step_tolerance {
             return Some(ended(&here, iteration, true));
         }
     }
@@ -171,16 +171,15 @@ fn newton_step<A: Arithmetic>(
         Some(solution) => (-solution, true),
         None => (-solve_lifted(&hessian, &gradient), false),
     };
-    let length = step.norm();
-    let promise = (is_convex && length < PROMISING_STEP).then(|| -step.dot(&gradient));
-    if length > MAX_STEP {
-        NewtonStep {
-            step: step * (MAX_STEP / length),
-            promise,
-        }
+    let squared_length = step.norm_squared();
+    let is_promising = is_convex && squared_length < PROMISING_STEP * PROMISING_STEP;
+    let promise = is_promising.then(|| -step.dot(&gradient));
+    let step = if squared_length > MAX_STEP * MAX_STEP {
+        step * (MAX_STEP / squared_length.sqrt())
     } else {
-        NewtonStep { step, promise }
-    }
+        step
+    };
+    NewtonStep { step, promise }
 }
 
 /// Returns `H⁻¹ g`; none unless the matrix is positive definite.

@@ -81,8 +81,8 @@ impl Kernel for PinholeFit<'_> {
             arithmetic,
             points: &self.problem.points,
         };
-        refine::maximum_likelihood(&residuals, self.start)
-            .map_err(|failure| self.problem.explain(failure, &self.start))
+        let explain = |failure| self.problem.explain(failure, &self.start);
+        refine::maximum_likelihood(&residuals, self.start, explain)
     }
 }
 
@@ -164,8 +164,8 @@ impl<'a> Problem<'a> {
                 start,
             }),
             Refinement::MaximumLikelihood => {
-                refine::maximum_likelihood(&self.lens_residuals(), start)
-                    .map_err(|failure| self.explain(failure, &start))
+                let explain = |failure| self.explain(failure, &start);
+                refine::maximum_likelihood(&self.lens_residuals(), start, explain)
             }
         };
         if let Ok(found) = &fit
@@ -177,7 +177,6 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the covariance of a fit, rotation before position of the markers' mean.
-    #[inline(always)]
     pub(crate) fn covariance(&self, fit: &Fit) -> Result<Matrix6<f64>, EstimateError> {
         match &fit.solver {
             Some(solver) => Ok(solver.covariance()),

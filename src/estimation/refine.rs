@@ -52,20 +52,25 @@ pub(crate) enum FitFailure {
     NotConverged,
 }
 
-/// Returns the maximum likelihood pose that descent from `start` reaches, and its covariance.
+/// Returns the maximum likelihood pose that descent from `start` reaches, with its factored information.
+///
+/// # Inputs
+/// * `explain`: makes an error of a failure.
 ///
 /// # Source
 /// `D = (1/z) [fx 0 −fx x; 0 fy −fy y]` for a pinhole, the lens model's derivative times
 /// `(1/z) [1 0 −x; 0 1 −y]` in general; `J = [−D [R p]×, D]`, weighted by each point's sigma.
 #[inline(always)]
-pub(crate) fn maximum_likelihood(
+pub(crate) fn maximum_likelihood<E>(
     residuals: &impl Residuals,
     start: CentredPose,
-) -> Result<Fit, FitFailure> {
+    explain: impl Fn(FitFailure) -> E,
+) -> Result<Fit, E> {
+    let singular = || explain(FitFailure::Singular);
     let mut pose = start;
     let mut here = residuals
         .linearise(&pose)
-        .ok_or(FitFailure::StartNotVisible)?;
+        .ok_or_else(|| explain(FitFailure::StartNotVisible))?;
     let mut damping = 0.0;
     for iteration in 1..=MAX_ITERATIONS {
         let Some(solver) = here.information.damped(damping).solver() else {
@@ -74,12 +79,13 @@ pub(crate) fn maximum_likelihood(
                 damping = 1e-3;
                 continue;
             }
-            return Err(FitFailure::Singular);
+            return Err(singular());
         };
         let step = solver.solve(&here.slope.gradient).map(|value| -value);
         let gain = -dot(&step, &here.slope.gradient);
         if damping == 0.0 && gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
-            return finish(&pose.moved(&step), &here.slope, gain, &solver, iteration);
+            return finish(&pose.moved(&step), &here.slope, gain, &solver, iteration)
+                .ok_or_else(singular);
         }
         if damping > 0.0
             && let Some(undamped) = here.information.solver()
@@ -88,7 +94,7 @@ pub(crate) fn maximum_likelihood(
             let gradient = &here.slope.gradient;
             let gain = dot(&undamped.solve(gradient), gradient);
             if gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
-                return finish(&pose, &here.slope, 0.0, &undamped, iteration);
+                return finish(&pose, &here.slope, 0.0, &undamped, iteration).ok_or_else(singular);
             }
         }
         let trial = pose.moved(&step);
@@ -100,7 +106,8 @@ pub(crate) fn maximum_likelihood(
             let last = solver.solve(&there.gradient).map(|value| -value);
             let gain = -dot(&last, &there.gradient);
             if gain < GAIN_TOLERANCE.max(ROUNDING * there.chi_squared) {
-                return finish(&trial.moved(&last), &there, gain, &solver, iteration + 1);
+                return finish(&trial.moved(&last), &there, gain, &solver, iteration + 1)
+                    .ok_or_else(singular);
             }
         }
         match residuals.linearise(&trial) {
@@ -111,12 +118,12 @@ pub(crate) fn maximum_likelihood(
             _ => {
                 damping = if damping == 0.0 { 1e-3 } else { damping * 10.0 };
                 if damping > MAX_DAMPING {
-                    return Err(FitFailure::NotConverged);
+                    return Err(explain(FitFailure::NotConverged));
                 }
             }
         }
     }
-    Err(FitFailure::NotConverged)
+    Err(explain(FitFailure::NotConverged))
 }
 
 #[inline(always)]
@@ -126,7 +133,7 @@ fn finish(
     gain: f64,
     solver: &Solver,
     iterations: u16,
-) -> Result<Fit, FitFailure> {
+) -> Option<Fit> {
     let chi_squared = (here.chi_squared - gain).max(0.0);
     // The last step changes both sums alike; it is too short to be worth another look at the points.
     let share = if here.chi_squared > 0.0 {
@@ -135,9 +142,9 @@ fn finish(
         1.0
     };
     if !(chi_squared.is_finite() && solver.is_finite()) {
-        return Err(FitFailure::Singular);
+        return None;
     }
-    Ok(Fit {
+    Some(Fit {
         pose: *pose,
         chi_squared,
         squared_residuals_px: here.squared_residuals_px * share,

@@ -7,9 +7,11 @@
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
+use super::EstimateError;
 use super::ambiguity::mirror_image;
 use super::problem::Problem;
 use super::refine::Fit;
+use crate::geometry::PoseCovariance;
 
 /// rad², trace of the attitude's covariance; a surer attitude is far from its mirror image.
 const SURE: f64 = 3.05e-4; // 1°
@@ -21,22 +23,40 @@ const WAY: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const STEEPNESS: f64 = 2.0;
 const SLACK: f64 = 6.0;
 
-/// Returns a wider covariance of a fit, rotation before position, where the error is flatter than its
-/// curvature promises; none where the fit's own is honest.
-#[inline]
-pub(crate) fn widened(
+/// Returns the covariance of `camera_from_tanker`, wider than the curvature promises where the error is flatter.
+///
+/// # Inputs
+/// * `lever`: from the tanker's origin to the markers' mean, camera axes, m.
+///
+/// # Errors
+/// [`EstimateError::Degenerate`] when the points do not fix the pose.
+#[inline(always)]
+pub(crate) fn honest_covariance(
     problem: &Problem,
     fit: &Fit,
-    covariance: &Matrix6<f64>,
-) -> Option<Matrix6<f64>> {
-    let c = covariance;
-    if c.m11 + c.m22 + c.m33 < SURE {
-        return None;
+    lever: &Vector3<f64>,
+) -> Result<PoseCovariance, EstimateError> {
+    match &fit.solver {
+        Some(solver) if solver.turn_variance() < SURE => Ok(solver.covariance_of_point(lever)),
+        _ => looked_at_closely(problem, fit, lever),
     }
-    flattest(problem, fit, covariance)
 }
 
-#[cold]
+#[inline(never)]
+fn looked_at_closely(
+    problem: &Problem,
+    fit: &Fit,
+    lever: &Vector3<f64>,
+) -> Result<PoseCovariance, EstimateError> {
+    let covariance = problem.covariance(fit)?;
+    let wide = (covariance.m11 + covariance.m22 + covariance.m33 >= SURE)
+        .then(|| flattest(problem, fit, &covariance))
+        .flatten();
+    let about_mean = wide.unwrap_or(covariance);
+    Ok(PoseCovariance::from_point(&about_mean, lever))
+}
+
+/// Returns a wider covariance, rotation before position of the markers' mean; none where the fit's own is honest.
 fn flattest(problem: &Problem, fit: &Fit, covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
     let information = upper_left(covariance).try_inverse()?;
