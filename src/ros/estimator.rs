@@ -195,6 +195,10 @@ impl Estimator {
             self.watch.on_image(header.stamp, begin);
         }
         if let Ok(solution) = &outcome.result {
+            let excluded = &solution.excluded;
+            let ids = frame.detections.iter().map(|seen| seen.id);
+            let markers = ids.map(|id| (id, excluded.contains(id)));
+            self.watch.on_pose(markers, begin);
             self.outputs
                 .pose
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);

@@ -181,6 +181,20 @@ def name_the_same_frame(scene: Scene) -> None:
     scene.frame_id = messages.CAMERA_FRAME
 
 
+def misplace_a_marker(scene: Scene) -> None:
+    # As with a map in which it stands elsewhere: it is off the same way in every image.
+    both(scene)
+    good = Scene.message
+
+    def message(topic: str) -> object:
+        told = good(scene, topic)
+        if topic == "/feature_points":
+            told.points[5].u += 30.0
+        return told
+
+    scene.message = message
+
+
 def jump(by: int) -> Callable[[Scene], None]:
     def provoke(scene: Scene) -> None:
         scene.index = FAR_AHEAD
@@ -224,7 +238,7 @@ def send_undecodable(scene: Scene) -> None:
     )
 
 
-def send_decodable(scene: Scene) -> None:
+def send_good(scene: Scene) -> None:
     del scene.message
 
 
@@ -305,6 +319,12 @@ CASES = {
     "two frames": Case(
         "frame_mismatch", "other_camera", name_another_frame, name_the_same_frame
     ),
+    "marker in the wrong place": Case(
+        "suspect_marker",
+        "marker 6 was left out of all",
+        misplace_a_marker,
+        send_good,
+    ),
     "stamps go back": Case("stamp_jump", "back by", jump(-1000), nothing),
     "stamps go far ahead": Case("stamp_jump", "ahead by", jump(10_000), nothing),
     "clock goes back": Case("clock_jump", "back by", turn_clock(-500), nothing, SIM_TIME),
@@ -313,7 +333,7 @@ CASES = {
         "undecodable",
         "a sample of feature_points cannot be decoded",
         send_undecodable,
-        send_decodable,
+        send_good,
     ),
     "clock stops": Case(
         "no_clock",

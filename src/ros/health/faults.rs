@@ -20,6 +20,8 @@ pub enum Fault {
     StaleCameraInfo,
     /// Detections and camera info name different frames.
     FrameMismatch,
+    /// A marker is left out of every pose.
+    SuspectMarker,
     /// Stamps of detections go back, or far ahead.
     StampJump,
     /// The simulated time goes back, or far ahead, or the system's back.
@@ -43,7 +45,7 @@ const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -51,6 +53,7 @@ impl Fault {
         Self::NoCameraInfo,
         Self::StaleCameraInfo,
         Self::FrameMismatch,
+        Self::SuspectMarker,
         Self::StampJump,
         Self::ClockJump,
         Self::NoClock,
@@ -70,6 +73,7 @@ impl Fault {
             Self::NoCameraInfo => "no_camera_info",
             Self::StaleCameraInfo => "stale_camera_info",
             Self::FrameMismatch => "frame_mismatch",
+            Self::SuspectMarker => "suspect_marker",
             Self::StampJump => "stamp_jump",
             Self::ClockJump => "clock_jump",
             Self::NoClock => "no_clock",
@@ -83,7 +87,9 @@ impl Fault {
     const fn lasts(self) -> Duration {
         match self {
             Self::StampJump | Self::ClockJump | Self::LostInput | Self::DroppedOutput => EVENT,
-            Self::NoCameraInfo | Self::FrameMismatch | Self::Undecodable => SHOWN_BY_FRAMES,
+            Self::NoCameraInfo | Self::FrameMismatch | Self::SuspectMarker | Self::Undecodable => {
+                SHOWN_BY_FRAMES
+            }
             // Looked for every second.
             _ => Duration::ZERO,
         }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use super::{Fault, Faults, Jumps, Latency};
+use super::{Fault, Faults, Jumps, Latency, Suspects};
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
 
@@ -112,6 +112,7 @@ pub struct Watch {
     detections: Arrivals,
     camera: Arrivals,
     stamps: Jumps,
+    suspects: Suspects,
     waiting_said: bool,
     without_camera: Option<WithoutCamera>,
 }
@@ -138,6 +139,7 @@ impl Watch {
             detections: Arrivals::default(),
             camera: Arrivals::default(),
             stamps: Jumps::default(),
+            suspects: Suspects::default(),
             waiting_said: false,
             without_camera: None,
         }
@@ -187,6 +189,20 @@ impl Watch {
             let topic = &self.detections_topic;
             let words = format!("stamps of {topic} went {jump}");
             self.faults.see(Fault::StampJump, &words, now);
+        }
+    }
+
+    /// Takes note of a pose: of the markers that it was given, and whether it leaves them out.
+    pub fn on_pose(&mut self, markers: impl Iterator<Item = (u32, bool)>, now: Instant) {
+        for (id, is_left_out) in markers {
+            if is_left_out {
+                if let Some(words) = self.suspects.left_out(id, now) {
+                    let of = id.to_string();
+                    self.faults.see_of(Fault::SuspectMarker, &of, &words, now);
+                }
+            } else if self.suspects.used(id) {
+                self.faults.end_of(Fault::SuspectMarker, &id.to_string());
+            }
         }
     }
 
