@@ -99,6 +99,8 @@ pub struct Estimator {
     reporter: Reporter,
     last_refusal: Option<String>,
     last_track: Option<TrackOutcome>,
+    /// Whether a pose was ever published.
+    has_estimated: bool,
     slowest: Duration,
     last_report: Instant,
     watch: Watch,
@@ -136,6 +138,7 @@ impl Estimator {
             reporter: Reporter::default(),
             last_refusal: None,
             last_track: None,
+            has_estimated: false,
             slowest: Duration::ZERO,
             last_report: Instant::now(),
             refusals: SaidOnce::default(),
@@ -430,7 +433,14 @@ impl Estimator {
         self.tally.count_track(answer.track.code());
         self.last_track = answer.track.outcome;
         self.slowest = self.slowest.max(solve_time);
-        if outcome == OutcomeCode::Ok {
+        if let Ok(solution) = &answer.result {
+            if !std::mem::replace(&mut self.has_estimated, true) {
+                let distance_m = solution.camera_from_tanker.translation.vector.norm();
+                let used = frame.detections.len() - solution.excluded.ids().count();
+                log::info!(
+                    "first pose: the tanker is {distance_m:.1} m away, found by {used} markers"
+                );
+            }
             if let Some(count) = self.refusals.good() {
                 let frames = if count == 1 { "frame" } else { "frames" };
                 log::info!("estimates resume after {count} refused {frames}");

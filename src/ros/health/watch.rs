@@ -111,6 +111,8 @@ pub struct Watch {
     begin: Instant,
     detections: Arrivals,
     camera: Arrivals,
+    /// Publishers of camera info that fit, a second ago.
+    cameras: usize,
     stamps: Jumps,
     suspects: Suspects,
     waiting_said: bool,
@@ -138,6 +140,7 @@ impl Watch {
             begin: now,
             detections: Arrivals::default(),
             camera: Arrivals::default(),
+            cameras: 0,
             stamps: Jumps::default(),
             suspects: Suspects::default(),
             waiting_said: false,
@@ -218,8 +221,19 @@ impl Watch {
                 return;
             }
             without.latest = None;
+            let words = self.without_camera_info(words);
+            self.faults.see(fault, &words, now);
+            return;
         }
         self.faults.see(fault, words, now);
+    }
+
+    fn without_camera_info(&self, refusal: &str) -> String {
+        let (camera, detections) = (&self.camera_topic, &self.detections_topic);
+        let publishers = self.cameras;
+        format!(
+            "{detections} come, but nothing has come on {camera} ({publishers} publisher(s) fit): {refusal}"
+        )
     }
 
     /// Looks for faults once a second.
@@ -228,6 +242,7 @@ impl Watch {
         let cameras = second.graph.heard(&self.camera_topic);
         self.detections.on_second(detectors, now);
         self.camera.on_second(cameras, now);
+        self.cameras = cameras;
         for misfit in second.graph.misfits.iter().take(MOST_MISFITS) {
             let (fault, words) = match misfit {
                 Misfit::Qos(words) => (Fault::IncompatibleQos, words),
@@ -237,8 +252,9 @@ impl Watch {
         }
         if let Some(without) = &mut self.without_camera
             && now.saturating_duration_since(without.since) >= GRACE
-            && let Some(words) = without.latest.take()
+            && let Some(refusal) = without.latest.take()
         {
+            let words = self.without_camera_info(&refusal);
             self.faults.see(Fault::NoCameraInfo, &words, now);
         }
         self.watch_inputs(detectors, cameras, now);

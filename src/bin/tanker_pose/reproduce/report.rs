@@ -73,9 +73,20 @@ fn line(
     let other = summary
         .other_minimum
         .map_or_else(String::new, |share| format!("{share:.6}"));
+    let steps = |count: u32| {
+        if method.iterates() {
+            count.to_string()
+        } else {
+            String::new()
+        }
+    };
+    let (median, p95) = (
+        steps(summary.iterations_median),
+        steps(summary.iterations_p95),
+    );
     writeln!(
         text,
-        ",{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{other},{},{}",
+        ",{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{other},{median},{p95}",
         summary.rotation_rms_deg,
         summary.rotation_median_deg,
         point.bound.rotation_deg,
@@ -83,8 +94,6 @@ fn line(
         summary.position_median_m,
         point.bound.position_m,
         summary.failures,
-        summary.iterations_median,
-        summary.iterations_p95,
     )
 }
 
@@ -212,8 +221,8 @@ fn method_json(method: Method, summary: &Summary) -> Value {
         "position_median_m": summary.position_median_m,
         "share_above_5_deg": summary.failures,
         "share_other_minimum": summary.other_minimum,
-        "iterations_median": summary.iterations_median,
-        "iterations_p95": summary.iterations_p95,
+        "iterations_median": method.iterates().then_some(summary.iterations_median),
+        "iterations_p95": method.iterates().then_some(summary.iterations_p95),
     })
 }
 
