@@ -2,6 +2,7 @@
 
 mod support;
 
+use nalgebra::Point3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::{random_refuelling_scene, settings};
@@ -22,7 +23,7 @@ fn rays_and_markers(
     scene: &Scene,
     sigma_px: f64,
     random: &mut ChaCha8Rng,
-) -> (Vec<Ray>, Vec<nalgebra::Point3<f64>>) {
+) -> (Vec<Ray>, Vec<Point3<f64>>) {
     scene
         .noisy_observations(sigma_px, random)
         .iter()
@@ -139,8 +140,11 @@ fn linear_start_is_exact_for_an_exact_image() {
     let mut random = ChaCha8Rng::seed_from_u64(23);
     let scene = random_refuelling_scene(&mut random, 12.0, 20.0);
     let (rays, markers) = rays_and_markers(&scene, 0.0, &mut random);
-    let rotation = linear_rotation(&rays, &markers).expect("six points in general position");
-    // The chord: of a turn below 1e-8 the angle is rounding, or NaN.
-    let error_rad = (rotation.matrix() - scene.truth_rotation().matrix()).norm();
-    assert!(error_rad < 1e-7, "{error_rad}");
+    for reference in [[0.0; 3], [5.0, 0.0, 1.0], [-30.0, 8.0, 2.0]] {
+        let rotation = linear_rotation(&rays, &markers, &Point3::from(reference))
+            .expect("six points in general position");
+        // The chord: of a turn below 1e-8 the angle is rounding, or NaN.
+        let error_rad = (rotation.matrix() - scene.truth_rotation().matrix()).norm();
+        assert!(error_rad < 1e-7, "{error_rad}");
+    }
 }

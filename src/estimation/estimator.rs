@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
 use super::exclude::{self, Suspects};
 use super::initialise::{self, linear_rotation};
-use super::points::INLINE_POINTS;
+use super::points::{INLINE_POINTS, mean};
 use super::problem::{Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
@@ -414,7 +414,7 @@ fn dlt_seed(
         .collect::<Result<SmallVec<[Ray; INLINE_POINTS]>, _>>()?;
     let markers: SmallVec<[Point3<f64>; INLINE_POINTS]> =
         observations.iter().map(|o| o.marker_in_tanker).collect();
-    linear_rotation(&rays, &markers)
+    linear_rotation(&rays, &markers, &mean(&markers, |marker| marker))
 }
 
 /// The best two of different poses, with their merits.

@@ -376,3 +376,52 @@ mod x86 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROWS: [Lane; 4] = [
+        [1.0, 20.0, 300.0, 4000.0],
+        [5.0, 60.0, 700.0, 8000.0],
+        [9.0, 10.0, 110.0, 1200.0],
+        [13.0, 14.0, 150.0, 1600.0],
+    ];
+
+    struct Everything;
+
+    impl Kernel for Everything {
+        type Output = (Lane, [Lane; 4], f64);
+
+        #[inline(always)]
+        fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
+            let [a, b, c, d] = [
+                Four::new(arithmetic, ROWS[0]),
+                Four::new(arithmetic, ROWS[1]),
+                Four::new(arithmetic, ROWS[2]),
+                Four::new(arithmetic, ROWS[3]),
+            ];
+            let [e, f, g, h] = Four::transposed([a, b, c, d]);
+            let totals = Four::totals([a, b, c, d]).lane();
+            (totals, [e.lane(), f.lane(), g.lane(), h.lane()], a.total())
+        }
+    }
+
+    #[test]
+    fn totals_and_columns_are_right_in_every_arithmetic() {
+        let totals = ROWS.map(|row| row.iter().sum());
+        let columns: [Lane; 4] = std::array::from_fn(|i| ROWS.map(|row| row[i]));
+        let expected = (totals, columns, totals[0]);
+        assert_eq!(Everything.run(Plain), expected);
+        assert_eq!(vectorised(Everything), expected);
+    }
+
+    #[test]
+    fn totals_of_any_count_stand_in_their_order() {
+        let fours: [Four<Plain>; 6] =
+            std::array::from_fn(|i| Four::new(Plain, ROWS[i % 4].map(|value| value * i as f64)));
+        let expected: [f64; 6] =
+            std::array::from_fn(|i| i as f64 * ROWS[i % 4].iter().sum::<f64>());
+        assert_eq!(totals(&fours).map(f64::to_bits), expected.map(f64::to_bits));
+    }
+}

@@ -162,7 +162,7 @@ pub struct Solution {
     pub degrees_of_freedom: u16,
     /// The largest `chi_squared` to trust.
     pub chi_squared_limit: f64,
-    /// Of all solver stages together.
+    /// Of all solver stages together, but for descents that were given up.
     pub iterations: u16,
     /// Where the iteration really started.
     pub initialisation: Initialisation,

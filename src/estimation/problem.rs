@@ -199,13 +199,15 @@ impl<'a> Problem<'a> {
         let (chi_squared, squared_residuals_px) =
             refine::squared_residuals(&self.lens_residuals(), &pose)
                 .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
-        Ok(Fit {
+        let fit = Fit {
             pose,
             chi_squared,
             squared_residuals_px,
             solver: None,
             iterations: 0,
-        })
+        };
+        // Without a covariance it is no candidate.
+        self.covariance(&fit).map(|_| fit)
     }
 
     fn lens_residuals(&self) -> LensResiduals<'_> {
@@ -264,14 +266,17 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the cost above which a minimum does not count next to this one: its likelihood is negligible.
-    /// Infinite for the paper's cost, which is not weighted by the noise.
+    /// Infinite for the paper's cost, which is not weighted by the noise, and next to a minimum that may turn
+    /// out to be none, with a marker behind the camera.
     pub(crate) fn negligible_cost(&self, best: &newton::Minimum) -> f64 {
-        match self.refinement {
-            Refinement::None => f64::INFINITY,
-            Refinement::MaximumLikelihood => {
-                let depth = self.cost.centre_in_camera(&best.rotation).z.abs() + self.points.radius;
-                best.cost + ambiguity::NEGLIGIBLE * depth * depth
-            }
+        let (depth, radius) = (
+            self.cost.centre_in_camera(&best.rotation).z,
+            self.points.radius,
+        );
+        if self.refinement == Refinement::MaximumLikelihood && depth > radius {
+            best.cost + ambiguity::NEGLIGIBLE * (depth + radius).powi(2)
+        } else {
+            f64::INFINITY
         }
     }
 

@@ -139,7 +139,7 @@ impl Solver {
             }
             Method::LinearAlone | Method::LinearIterated => {
                 let frame = Frame::new(camera, observations)?;
-                let seed = linear_rotation(&frame.rays, &frame.markers)?;
+                let seed = linear_rotation(&frame.rays, &frame.markers, &Point3::origin())?;
                 let stop = match method {
                     Method::LinearAlone => Stop::Steps(0), // only Eq. (13)
                     _ => stop,
@@ -228,14 +228,19 @@ impl Frame {
         // A step is a small share of the distance that remains, the smaller the slower the iteration.
         let settled = self.iterate(seed, distance_rad * 1e-2, MAX_ITERATIONS)?;
         let end = fixed_point(&self.rays, &self.markers, &rotation_of(&settled))?;
+        let is_near =
+            |iterated: &Iterated| chord(&rotation_of(iterated), &rotation_of(&end)) < distance_rad;
         let mut far = self.iterate(seed, 0.0, 0)?;
+        if is_near(&far) || !is_near(&settled) {
+            // Too many steps rather than too few, if even a hundredth as a last step does not lead near.
+            return Ok(if is_near(&far) { far } else { settled });
+        }
         let mut near = settled;
         while near.iterations - far.iterations > 1 {
             let steps = (near.iterations - far.iterations) / 2;
             let mut middle = self.iterate(&rotation_of(&far), 0.0, steps)?;
             middle.iterations = far.iterations + steps;
-            let (now, last) = (rotation_of(&middle), rotation_of(&end));
-            if chord(&now, &last) < distance_rad {
+            if is_near(&middle) {
                 near = middle;
             } else {
                 far = middle;

@@ -18,14 +18,17 @@ const MIN_EIGENVALUE_SHARE: f64 = 1e-12;
 
 /// Returns the rotation part of `camera_from_tanker` from a normalised direct linear transform.
 ///
-/// Rays are moved to their mean and scaled to unit spread (Hartley), markers are scaled to unit
-/// spread, the smallest right singular vector of the `2n × 12` matrix gives the camera matrix, its
+/// Rays are moved to their mean and scaled to unit spread (Hartley), markers are taken from a reference
+/// point and scaled to unit spread, the smallest right singular vector of the `2n × 12` matrix gives the camera matrix, its
 /// sign is chosen so that the markers lie in front, and its left 3×3 part is projected onto the
 /// rotations.
 ///
 /// # Inputs
 /// * `rays`: `n ≥ 6` undistorted points on the `z = 1` plane.
 /// * `markers_in_tanker`: the same `n` markers in the same order, m, not all in one plane.
+/// * `reference_in_tanker`: m; the tanker's origin as in the paper, or the markers' mean as Hartley has it.
+///   The unit length of the solution weighs other entries then: with noise another rotation results, with a
+///   reference some hundred spreads away none.
 ///
 /// # Errors
 /// [`EstimateError::TooFewPoints`]; [`EstimateError::Degenerate`] when the points leave more than one
@@ -37,6 +40,7 @@ const MIN_EIGENVALUE_SHARE: f64 = 1e-12;
 pub fn linear_rotation(
     rays: &[Ray],
     markers_in_tanker: &[Point3<f64>],
+    reference_in_tanker: &Point3<f64>,
 ) -> Result<Rotation3<f64>, EstimateError> {
     let n = rays.len().min(markers_in_tanker.len());
     if n < MIN_POINTS || rays.len() != markers_in_tanker.len() {
@@ -46,7 +50,7 @@ pub fn linear_rotation(
         });
     }
     let image = image_normaliser(rays);
-    let object = object_normaliser(markers_in_tanker);
+    let object = object_normaliser(markers_in_tanker, reference_in_tanker);
     let mut normal = Matrix12::zeros();
     for (ray, marker) in rays.iter().zip(markers_in_tanker) {
         let u = image * Vector3::new(ray.x, ray.y, 1.0);
@@ -97,11 +101,11 @@ fn image_normaliser(rays: &[Ray]) -> Matrix3<f64> {
     Matrix3::new(s, 0.0, -s * x, 0.0, s, -s * y, 0.0, 0.0, 1.0)
 }
 
-/// Scale alone: the origin stays that of the tanker, as in the paper. Moved to the mean, the unit
-/// length of the solution weighs other entries, and the share of wrong minima changes.
-fn object_normaliser(markers: &[Point3<f64>]) -> Matrix4<f64> {
+fn object_normaliser(markers: &[Point3<f64>], reference: &Point3<f64>) -> Matrix4<f64> {
     let centre = mean(markers, |marker| marker);
     let spread = markers.iter().map(|p| (p - centre).norm()).sum::<f64>() / markers.len() as f64;
     let s = 3.0_f64.sqrt() / spread.max(f64::MIN_POSITIVE);
-    Matrix4::from_diagonal(&Vector4::new(s, s, s, 1.0))
+    let mut normaliser = Matrix4::from_diagonal(&Vector4::new(s, s, s, 1.0));
+    normaliser.set_column(3, &(reference.coords * -s).push(1.0));
+    normaliser
 }
