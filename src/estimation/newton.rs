@@ -104,9 +104,10 @@ fn descend<A: Arithmetic>(arithmetic: A, descent: &Descent) -> Option<Minimum> {
     };
     for iteration in 1..=MAX_ITERATIONS {
         let NewtonStep { mut step, promise } = newton_step(arithmetic, cost, &here);
-        let is_hopeless =
-            |gain: f64| gain < CREDIBLE_GAIN * here.value && here.value - gain > HOPELESS * limit;
-        if promise.is_some_and(is_hopeless) {
+        if let Some(gain) = promise
+            && gain < CREDIBLE_GAIN * here.value
+            && here.value - gain > HOPELESS * limit
+        {
             return None;
         }
         let mut halvings = 0;

@@ -199,15 +199,13 @@ impl<'a> Problem<'a> {
         let (chi_squared, squared_residuals_px) =
             refine::squared_residuals(&self.lens_residuals(), &pose)
                 .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
-        let fit = Fit {
+        Ok(Fit {
             pose,
             chi_squared,
             squared_residuals_px,
             solver: None,
             iterations: 0,
-        };
-        // Without a covariance it is no candidate.
-        self.covariance(&fit).map(|_| fit)
+        })
     }
 
     fn lens_residuals(&self) -> LensResiduals<'_> {
