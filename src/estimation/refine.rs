@@ -16,9 +16,9 @@ pub(crate) const MAX_ITERATIONS: u16 = 50;
 const GAIN_TOLERANCE: f64 = 1e-6;
 /// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
-/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 0.3 % of
+/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 0.15 % of
 /// themselves for the shipped maps, to about 1 % for a target that is flat and face on, or nearer than its size.
-const NEAR: f64 = 1.5e-3;
+const NEAR: f64 = 7e-4;
 /// Damping at which no step in any direction helps any more.
 const MAX_DAMPING: f64 = 1e9;
 
