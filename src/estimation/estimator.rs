@@ -1,6 +1,6 @@
 //! The one call that turns observations into a judged pose.
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
@@ -303,10 +303,7 @@ impl Estimator {
         let residuals = 2 * problem.observations.len();
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Ok(Solution {
-            camera_from_tanker: Isometry3::from_parts(
-                Translation3::from(fit.pose.centre_in_camera - lever),
-                UnitQuaternion::from_rotation_matrix(&fit.pose.rotation),
-            ),
+            camera_from_tanker: fit.pose.about_origin(&lever),
             covariance: honest_covariance(problem, fit, &lever)?,
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,

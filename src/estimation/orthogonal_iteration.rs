@@ -13,7 +13,7 @@ use super::four::Plain;
 use super::newton::{self, Minimum};
 use super::points::{Blocks, Points, mean};
 use crate::camera::Ray;
-use crate::geometry::{nearest_rotation, nearest_rotation_by_svd};
+use crate::geometry::{chord, nearest_rotation, nearest_rotation_by_svd};
 
 /// Where an orthogonal iteration ended.
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ pub fn iterate_literally(
             / n;
         let next = nearest_rotation_by_svd(&covariance); // Eqs. (7)–(8)
         iterations += 1;
-        converged = turn(&rotation, &next) < tolerance_rad;
+        converged = chord(&rotation, &next) < tolerance_rad;
         rotation = next;
     }
     Ok(finish(
@@ -130,7 +130,7 @@ pub fn iterate_accelerated(
         let half_gradient = cost.half_gradient(Plain, &splats).matrix();
         let next = nearest_rotation(&(rotation.matrix() * scatter - half_gradient));
         iterations += 1;
-        converged = turn(&rotation, &next) < tolerance_rad;
+        converged = chord(&rotation, &next) < tolerance_rad;
         rotation = next;
     }
     let t = cost.centre_in_camera(&rotation) - rotation * p_mean.coords;
@@ -178,11 +178,6 @@ fn check(rays: &[Ray], markers_in_tanker: &[Point3<f64>]) -> Result<f64, Estimat
         return Err(EstimateError::TooFewPoints { got, need: 3 });
     }
     Ok(got as f64)
-}
-
-/// The chord between two rotations, rad for small ones; unlike the angle it resolves less than 1e-8.
-fn turn(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
-    (to.matrix() - from.matrix()).norm() / std::f64::consts::SQRT_2
 }
 
 fn finish(

@@ -1,6 +1,6 @@
 //! One frame's problem, prepared: points about their mean, the quadratic cost, fits from a seed.
 
-use nalgebra::{Isometry3, Matrix6, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix6, Rotation3};
 
 use super::ambiguity;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
@@ -218,11 +218,7 @@ impl<'a> Problem<'a> {
 
     /// Returns `camera_from_tanker` of a pose about the markers' mean.
     pub(crate) fn pose(&self, pose: &CentredPose) -> Isometry3<f64> {
-        let t = pose.centre_in_camera - pose.rotation * self.points.mean.coords;
-        Isometry3::from_parts(
-            Translation3::from(t),
-            UnitQuaternion::from_rotation_matrix(&pose.rotation),
-        )
+        pose.about_origin(&(pose.rotation * self.points.mean.coords))
     }
 
     /// What "best" means: each refinement minimises its own error.

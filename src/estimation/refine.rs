@@ -4,7 +4,7 @@
 //! model evaluated at the prediction, so that a distorted image is fitted where its noise lives.
 //! Steps that do not descend are damped (Levenberg-Marquardt).
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::information::{Solver, Vector};
 use super::residuals::{Residuals, Slope};
@@ -165,6 +165,18 @@ impl CentredPose {
         let turn = Vector3::new(step[0], step[1], step[2]).norm_squared();
         let motion = Vector3::new(step[3], step[4], step[5]).norm_squared();
         turn < NEAR * NEAR && motion < (NEAR * self.centre_in_camera.z).powi(2)
+    }
+
+    /// Returns `camera_from_tanker`.
+    ///
+    /// # Inputs
+    /// * `lever`: from the tanker's origin to the markers' mean, camera axes, m.
+    #[inline(always)]
+    pub(crate) fn about_origin(&self, lever: &Vector3<f64>) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::from(self.centre_in_camera - lever),
+            UnitQuaternion::from_rotation_matrix(&self.rotation),
+        )
     }
 
     #[inline(always)]

@@ -15,6 +15,12 @@ pub fn axial(m: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12)
 }
 
+/// Returns the chord between two rotations, rad for small ones; unlike the angle it resolves less than 1e-8.
+#[must_use]
+pub fn chord(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
+    (to.matrix() - from.matrix()).norm() / std::f64::consts::SQRT_2
+}
+
 /// Returns the rotation `cay(w) = (I − [w]×/2)⁻¹ (I + [w]×/2)`, which is `Exp(w)` to second order.
 ///
 /// It needs no sine, and is a rotation to machine precision for every finite `w` (radians).

@@ -10,7 +10,7 @@ use crate::estimation::{
     EstimateError, Estimator, EstimatorSettings, Iterated, Observation, fixed_point,
     iterate_accelerated, linear_rotation,
 };
-use crate::geometry::optical_from_body;
+use crate::geometry::{chord, optical_from_body};
 
 /// rad; a step that turns by less is the last of an iteration that settles.
 const SETTLED: f64 = 1e-10;
@@ -267,11 +267,6 @@ impl Frame {
 
 fn rotation_of(iterated: &Iterated) -> Rotation3<f64> {
     iterated.camera_from_tanker.rotation.to_rotation_matrix()
-}
-
-/// rad for small ones; unlike the angle it resolves less than 1e-8.
-fn chord(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
-    (to.matrix() - from.matrix()).norm() / std::f64::consts::SQRT_2
 }
 
 #[cfg(test)]

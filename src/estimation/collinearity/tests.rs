@@ -41,6 +41,12 @@ fn example() -> (Camera, Vec<Observation>, Rotation3<f64>) {
     )
 }
 
+fn cost_of(points: &Points, weighting: Weighting) -> Option<CollinearityCost> {
+    let moments = CollinearityMoments::new(Plain, points, weighting);
+    let mut cost = CollinearityCost::EMPTY;
+    cost.fill(Plain, &moments).map(|()| cost)
+}
+
 fn literal_error(
     rays: &[(Vector3<f64>, Vector3<f64>)],
     r: &Rotation3<f64>,
@@ -60,9 +66,7 @@ fn quadratic_form_equals_the_papers_sum_at_its_best_translation() {
     let mut room = Blocks::new();
     let points =
         Points::new(Plain, &camera, &observations, &mut room).expect("points in general position");
-    let moments = CollinearityMoments::new(Plain, &points, Weighting::ObjectSpace);
-    let mut cost = CollinearityCost::EMPTY;
-    cost.fill(Plain, &moments).expect("five different rays");
+    let cost = cost_of(&points, Weighting::ObjectSpace).expect("five different rays");
     let rays: Vec<_> = observations
         .iter()
         .map(|seen| {
@@ -92,9 +96,7 @@ fn curvature_is_that_of_the_quadratic_form() {
     let mut room = Blocks::new();
     let points =
         Points::new(Plain, &camera, &observations, &mut room).expect("points in general position");
-    let moments = CollinearityMoments::new(Plain, &points, Weighting::Image);
-    let mut cost = CollinearityCost::EMPTY;
-    cost.fill(Plain, &moments).expect("five different rays");
+    let cost = cost_of(&points, Weighting::Image).expect("five different rays");
     let form = |m: &Matrix3<f64>| {
         let unchecked = Rotation3::from_matrix_unchecked(*m);
         cost.value(Plain, &unchecked)
@@ -140,9 +142,7 @@ fn identical_rays_are_refused() {
     }
     let mut room = Blocks::new();
     let points = Points::new(Plain, &camera, &observations, &mut room).expect("the markers differ");
-    let moments = CollinearityMoments::new(Plain, &points, Weighting::Image);
-    let mut cost = CollinearityCost::EMPTY;
-    assert!(cost.fill(Plain, &moments).is_none());
+    assert!(cost_of(&points, Weighting::Image).is_none());
 }
 
 #[test]
@@ -151,9 +151,7 @@ fn four_at_once_have_the_costs_and_depths_of_one_by_one() {
     let mut room = Blocks::new();
     let points =
         Points::new(Plain, &camera, &observations, &mut room).expect("points in general position");
-    let moments = CollinearityMoments::new(Plain, &points, Weighting::Image);
-    let mut cost = CollinearityCost::EMPTY;
-    cost.fill(Plain, &moments).expect("five different rays");
+    let cost = cost_of(&points, Weighting::Image).expect("five different rays");
     let four: [Rotation3<f64>; LANES] =
         std::array::from_fn(|k| r * Rotation3::new(Vector3::new(0.3, -0.5, 0.4) * k as f64));
     let entries: [Lane; 9] = std::array::from_fn(|i| four.map(|rotation| rotation.matrix()[i]));
