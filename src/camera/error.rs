@@ -39,7 +39,51 @@ pub enum CameraError {
         value: f64,
         limit: f64,
     },
-    /// An entry that the form of the matrix fixes; `k[1]` and `p[1]` would be skew, which is not supported.
+    /// A principal point far outside an image of known size.
+    #[error(
+        "the principal point ({cx}, {cy}) of {array} lies more than one image size outside the image of \
+         {width}x{height}: the calibration belongs to another resolution, or the image is a region of a larger one \
+         (set roi, and width and height of the full image)"
+    )]
+    PrincipalPointOutside {
+        array: &'static str,
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
+    },
+    /// Width and height stand in each other's place.
+    #[error(
+        "width {width} and height {height} are exchanged, or belong to another calibration: the principal point \
+         ({cx}, {cy}) is the centre of an image of {height}x{width}"
+    )]
+    SizeExchanged {
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
+    },
+    /// The intrinsics are those of the binned image, where those of full resolution belong.
+    #[error(
+        "the principal point ({cx}, {cy}) of {array} is the centre of the image after binning by \
+         {binning_x}x{binning_y}: k and p belong to full resolution, or binning to 1"
+    )]
+    BinningApplied {
+        array: &'static str,
+        cx: f64,
+        cy: f64,
+        binning_x: u32,
+        binning_y: u32,
+    },
+    /// Skew, which is not supported.
+    #[error("{array}[{index}], the skew, must be 0 (up to {limit:.1e} px), got {value:?}")]
+    Skew {
+        array: &'static str,
+        index: usize,
+        value: f64,
+        limit: f64,
+    },
+    /// An entry that the form of the matrix fixes.
     #[error("{array}[{index}] must be {expected}, got {value:?}")]
     FixedEntry {
         array: &'static str,
@@ -54,7 +98,7 @@ pub enum CameraError {
     Baseline { index: usize, value: f64 },
     /// A lens that we have no formula for.
     #[error(
-        "distortion model `{}` with d = [{}] is not known; known are {known}",
+        "distortion model `{}` with d = [{}] is not known; known are {known}{hint}",
         clip(model),
         list(d)
     )]
@@ -62,10 +106,11 @@ pub enum CameraError {
         model: String,
         d: Vec<f64>,
         known: &'static str,
+        hint: &'static str,
     },
     /// More or fewer coefficients than the lens model has.
     #[error(
-        "distortion model `{}` needs {need} coefficients, got {got}: d = [{}]",
+        "distortion model `{}` needs {need} coefficients (more only if those are 0), got {got}: d = [{}]",
         clip(model),
         list(d)
     )]

@@ -47,16 +47,28 @@ pub struct RegionOfInterest {
 const MIN_FOCAL_LENGTH_PX: f64 = 1.0;
 /// Largest focal length, px: a metre-long lens on one-micrometre pixels.
 const MAX_FOCAL_LENGTH_PX: f64 = 1.0e6;
-/// Farthest principal point, px: a region of interest may lie far from it, but on some sensor.
+/// Farthest principal point, px, where the size of the image is not known: on some sensor.
 const MAX_PRINCIPAL_POINT_PX: f64 = 1.0e6;
+/// Farthest principal point outside the image, in image sizes: an image cropped to the corner of its sensor, a
+/// quarter as wide, still passes.
+const MAX_SIZES_OUTSIDE: f64 = 1.0;
+/// How near to the centre of the image a principal point usually is, in image sizes.
+const USUAL_OFFSET: f64 = 0.04;
+/// From this offset on, in image sizes, another reading of the numbers that puts it at the centre is the likely one.
+const UNUSUAL_OFFSET: f64 = 0.08;
+/// Largest skew, as a part of the focal length, that is rounding of a calibration and not skew: 1e-3 px at the
+/// edge of an image as wide as the focal length.
+const MAX_SKEW: f64 = 1.0e-6;
+/// Least number of coefficients; missing ones after these are 0.
+const MIN_COEFFICIENTS: usize = 4;
 /// Largest distortion coefficient: those of long lenses are large, their rays being close to the axis.
 const MAX_COEFFICIENT: f64 = 1.0e9;
 /// How far an entry fixed by a matrix's form may be off: rounding of a program that computed it.
 const FIXED_ENTRY_TOLERANCE: f64 = 1.0e-9;
 
-/// The models that we have formulas for.
 /// Coefficients that an error keeps.
 const MAX_TOLD: usize = 16;
+/// The models that have a formula here.
 const KNOWN_MODELS: &str = "plumb_bob, rational_polynomial, equidistant";
 
 /// Parts of the names that vendors give to fisheye models, which bend rays even when all coefficients
@@ -78,6 +90,7 @@ pub(super) fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, Camer
         )
     };
     let image_size_px = image_size(info)?;
+    check_principal_point(info, if rectified { "p" } else { "k" }, &intrinsics)?;
     let [fx, fy, cx, cy] = intrinsics;
     let (binning_x, binning_y) = (
         f64::from(info.binning_x.max(1)),
@@ -96,7 +109,8 @@ pub(super) fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, Camer
 /// Returns `[fx, fy, cx, cy]` of K.
 fn camera_matrix(k: &[f64; 9]) -> Result<[f64; 4], CameraError> {
     check_finite("k", k)?;
-    check_fixed("k", k, &[(1, 0.0), (3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)])?;
+    check_skew("k", k, 1)?;
+    check_fixed("k", k, &[(3, 0.0), (6, 0.0), (7, 0.0), (8, 1.0)])?;
     check_intrinsics("k", k, [0, 4, 2, 5])
 }
 
@@ -114,10 +128,11 @@ fn projection(p: &[f64; 12]) -> Result<[f64; 4], CameraError> {
             });
         }
     }
+    check_skew("p", p, 1)?;
     check_fixed(
         "p",
         p,
-        &[(1, 0.0), (4, 0.0), (8, 0.0), (9, 0.0), (10, 1.0), (11, 0.0)],
+        &[(4, 0.0), (8, 0.0), (9, 0.0), (10, 1.0), (11, 0.0)],
     )?;
     check_intrinsics("p", p, [0, 5, 2, 6])
 }
@@ -152,6 +167,72 @@ fn check_fixed(
                 value,
             });
         }
+    }
+    Ok(())
+}
+
+fn check_skew(array: &'static str, values: &[f64], index: usize) -> Result<(), CameraError> {
+    let (skew, limit) = (values[index], MAX_SKEW * values[0].abs());
+    if skew.abs() > limit {
+        return Err(CameraError::Skew {
+            array,
+            index,
+            value: skew,
+            limit,
+        });
+    }
+    Ok(())
+}
+
+/// Checks the principal point against the size of the full image, as far as that is known.
+///
+/// Also notices two slips that leave each number plausible and the pose wrong: width and height exchanged, and
+/// intrinsics of the binned image beside a binning.
+fn check_principal_point(
+    info: &CameraInfo,
+    array: &'static str,
+    &[_, _, cx, cy]: &[f64; 4],
+) -> Result<(), CameraError> {
+    let (width, height) = (f64::from(info.width), f64::from(info.height));
+    if width == 0.0 || height == 0.0 {
+        return Ok(());
+    }
+    let margin = MAX_SIZES_OUTSIDE;
+    let is_far = |centre: f64, size: f64| centre < -margin * size || centre > (1.0 + margin) * size;
+    if is_far(cx, width) || is_far(cy, height) {
+        return Err(CameraError::PrincipalPointOutside {
+            array,
+            cx,
+            cy,
+            width: info.width,
+            height: info.height,
+        });
+    }
+    let offset = |width: f64, height: f64| -> [f64; 2] {
+        [(cx / width - 0.5).abs(), (cy / height - 0.5).abs()]
+    };
+    let is_usual = |offsets: [f64; 2]| offsets.iter().all(|&offset| offset < USUAL_OFFSET);
+    let is_unusual = offset(width, height)
+        .iter()
+        .all(|&offset| offset > UNUSUAL_OFFSET);
+    if is_unusual && is_usual(offset(height, width)) {
+        return Err(CameraError::SizeExchanged {
+            cx,
+            cy,
+            width: info.width,
+            height: info.height,
+        });
+    }
+    let (binning_x, binning_y) = (info.binning_x.max(1), info.binning_y.max(1));
+    let binned = offset(width / f64::from(binning_x), height / f64::from(binning_y));
+    if binning_x > 1 && binning_y > 1 && is_unusual && is_usual(binned) {
+        return Err(CameraError::BinningApplied {
+            array,
+            cx,
+            cy,
+            binning_x,
+            binning_y,
+        });
     }
     Ok(())
 }
@@ -203,42 +284,59 @@ fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
             limit: MAX_COEFFICIENT,
         });
     }
-    let count = |need: &'static str| {
-        Err(CameraError::CoefficientCount {
-            model: model.to_owned(),
-            need,
-            got: d.len(),
-            d: d.iter().take(MAX_TOLD).copied().collect(),
-        })
-    };
     let all_zero = d.iter().all(|&value| value == 0.0);
-    match (model, d) {
-        ("equidistant", &[k1, k2, k3, k4]) => {
-            Ok(Some(Lens::Equidistant(Equidistant::new([k1, k2, k3, k4]))))
+    match model {
+        "equidistant" => {
+            let k = coefficients(model, d, "4")?;
+            Ok(Some(Lens::Equidistant(Equidistant::new(k))))
         }
-        ("equidistant", _) => count("4"),
-        ("plumb_bob" | "rational_polynomial", _) if all_zero => Ok(None),
-        ("plumb_bob", &[k1, k2, p1, p2]) => {
-            Ok(Some(brown_conrady([k1, k2, 0.0, 0.0, 0.0, 0.0], [p1, p2])))
-        }
-        ("plumb_bob", &[k1, k2, p1, p2, k3]) => {
+        "plumb_bob" | "rational_polynomial" if all_zero => Ok(None),
+        "plumb_bob" => {
+            let [k1, k2, p1, p2, k3] = coefficients(model, d, "4 or 5")?;
             Ok(Some(brown_conrady([k1, k2, k3, 0.0, 0.0, 0.0], [p1, p2])))
         }
-        ("plumb_bob", _) => count("4 or 5"),
         // OpenCV's longer vectors go on with thin prism and tilt, which ROS's model does not have.
-        ("rational_polynomial", &[k1, k2, p1, p2, k3, k4, k5, k6, ref rest @ ..])
-            if rest.iter().all(|&value| value == 0.0) =>
-        {
+        "rational_polynomial" => {
+            let [k1, k2, p1, p2, k3, k4, k5, k6] = coefficients(model, d, "4 to 8")?;
             Ok(Some(brown_conrady([k1, k2, k3, k4, k5, k6], [p1, p2])))
         }
-        ("rational_polynomial", _) => count("8 (more if the others are 0)"),
         _ if all_zero && !names_a_fisheye(model) => Ok(None),
         _ => Err(CameraError::UnknownDistortionModel {
             model: model.to_owned(),
             d: d.iter().take(MAX_TOLD).copied().collect(),
             known: KNOWN_MODELS,
+            hint: if names_a_fisheye(model) {
+                "; ROS calls OpenCV's fisheye model (4 coefficients) `equidistant`"
+            } else {
+                ""
+            },
         }),
     }
+}
+
+/// Returns a model's coefficients: missing ones at the end are 0, and more than the model has must be 0.
+///
+/// Both are common: drivers with one message for every lens pad with zeros, and calibrations leave out what they
+/// did not estimate.
+fn coefficients<const N: usize>(
+    model: &str,
+    d: &[f64],
+    need: &'static str,
+) -> Result<[f64; N], CameraError> {
+    let rest_is_zero = d.iter().skip(N).all(|&value| value == 0.0);
+    if d.len() < MIN_COEFFICIENTS || !rest_is_zero {
+        return Err(CameraError::CoefficientCount {
+            model: model.to_owned(),
+            need,
+            got: d.len(),
+            d: d.iter().take(MAX_TOLD).copied().collect(),
+        });
+    }
+    let mut filled = [0.0; N];
+    for (to, &from) in filled.iter_mut().zip(d) {
+        *to = from;
+    }
+    Ok(filled)
 }
 
 fn brown_conrady(radial: [f64; 6], tangential: [f64; 2]) -> Lens {

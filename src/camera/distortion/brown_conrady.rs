@@ -2,10 +2,7 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use super::{MAX_ANGLE, MIN_STRETCH, polynomial, solve_rising};
-
-/// Least denominator of the radial ratio: a calibrated one stays of order one, and at 0 is a pole.
-const MIN_DENOMINATOR: f64 = 1.0e-2;
+use super::{MAX_ANGLE, MAX_STRETCH, MIN_STRETCH, polynomial, solve_rising};
 
 /// A lens with a radial ratio and a tangential part, with `s = x² + y²`:
 /// ```text
@@ -45,28 +42,36 @@ impl BrownConrady {
         lens
     }
 
-    /// Returns the first radius at which `d(L r)/dr` falls to [`MIN_STRETCH`] or the denominator to
-    /// [`MIN_DENOMINATOR`], at most that of 89°: roots of polynomials in `s`.
+    /// Returns the first radius at which `d(L r)/dr` falls to [`MIN_STRETCH`] or, on the way up to a pole, rises to
+    /// [`MAX_STRETCH`], or at which the denominator has a root; at most that of 89°. All are roots of polynomials in
+    /// `s`.
+    ///
+    /// How small the denominator is says nothing: calibrations often give a numerator and a denominator that nearly
+    /// cancel, both close to 0 where their ratio is close to 1. A pole is a root, and before it the stretch grows
+    /// without bound.
     fn radial_limit(&self) -> f64 {
         let (n, d) = (&self.numerator[..], &self.denominator[..]);
         let upper = MAX_ANGLE.tan().powi(2);
         // d(L r)/dr · D² = N D + 2 s (N' D - N D')
-        let value = polynomial::multiply(n, d);
+        let mut stretch = polynomial::multiply(n, d);
         let up = polynomial::multiply(&polynomial::derivative(n), d);
         let down = polynomial::multiply(n, &polynomial::derivative(d));
-        let square = polynomial::multiply(d, d);
-        let mut slope: Vec<f64> = value
-            .iter()
-            .zip(&square)
-            .map(|(value, square)| value - MIN_STRETCH * square)
-            .collect();
         for (power, (up, down)) in up.iter().zip(&down).enumerate() {
-            slope[power + 1] += 2.0 * (up - down);
+            stretch[power + 1] += 2.0 * (up - down);
         }
-        let mut pole = self.denominator;
-        pole[0] -= MIN_DENOMINATOR;
-        [&slope[..], &pole[..]]
-            .into_iter()
+        let square = polynomial::multiply(d, d);
+        let less = |limit: f64| -> Vec<f64> {
+            let members = stretch.iter().zip(&square);
+            members
+                .map(|(value, square)| value - limit * square)
+                .collect()
+        };
+        let mut limits = vec![less(MIN_STRETCH)];
+        if self.denominator != [1.0, 0.0, 0.0, 0.0] {
+            limits.extend([less(MAX_STRETCH), d.to_vec()]);
+        }
+        limits
+            .iter()
             .filter_map(|limit| polynomial::first_sign_change(limit, upper))
             .fold(upper, f64::min)
             .sqrt()
@@ -225,9 +230,47 @@ mod tests {
 
     #[test]
     fn the_region_ends_before_a_pole() {
-        // The denominator 1 - s is MIN_DENOMINATOR here, and the ratio rises all the way.
+        // L r = r / (1 - s) has the slope (1 + s) / (1 - s)², and its pole at 1.
         let lens = BrownConrady::new([0.0, 0.0, 0.0, -1.0, 0.0, 0.0], [0.0; 2]);
-        assert!((lens.max_radius - (1.0 - MIN_DENOMINATOR).sqrt()).abs() < 1.0e-12);
+        let square = lens.max_radius * lens.max_radius;
+        let slope = (1.0 + square) / (1.0 - square).powi(2);
+        assert!(
+            square < 1.0 && (slope - MAX_STRETCH).abs() < 1.0e-9,
+            "{square}"
+        );
+    }
+
+    #[test]
+    fn a_pole_that_a_root_of_the_numerator_nearly_cancels_still_ends_the_region() {
+        // The pole is at s = 0.25; its residue is so small that the ratio is 1 nearly everywhere.
+        let numerator = -1.0 / 0.250_000_1;
+        let lens = BrownConrady::new([numerator, 0.0, 0.0, -4.0, 0.0, 0.0], [0.0; 2]);
+        assert!(
+            lens.max_radius < 0.5 && lens.max_radius > 0.49,
+            "{}",
+            lens.max_radius
+        );
+        let beyond = Point2::new(0.6 * lens.ratio(0.36).0, 0.0);
+        let ray = lens.undistort(beyond).and_then(|ideal| lens.distort(ideal));
+        assert!(
+            ray.is_none_or(|(back, _)| (back - beyond).norm() > 1.0e-6),
+            "{ray:?}"
+        );
+    }
+
+    #[test]
+    fn a_small_denominator_without_a_root_ends_nothing() {
+        // A real calibration: both go down to 0.002, their ratio stays within 0.9 and 1.1.
+        let radial = [
+            -13.238_113,
+            -98.012_135,
+            1357.782_415,
+            -13.050_801,
+            -102.363_353,
+            1383.055_291,
+        ];
+        let lens = BrownConrady::new(radial, [0.001_444, 0.002_849]);
+        assert!(lens.max_radius > 0.6, "{}", lens.max_radius);
     }
 
     #[test]

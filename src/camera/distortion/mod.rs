@@ -23,6 +23,12 @@ pub(super) use equidistant::Equidistant;
 /// to this limit is about a thousandth smaller than that to the turning point.
 const MIN_STRETCH: f64 = 1.0e-3;
 
+/// Largest radial stretch at which a rational lens model still counts as valid, as a part of that in the image centre.
+///
+/// Lenses stay within a factor of three or so. More is the way up to a pole of a rational model, on which all of the
+/// plane beyond the image is squeezed into a thin ring of rays.
+const MAX_STRETCH: f64 = 10.0;
+
 /// Widest angle off the axis, rad: near 90° a ray leaves the plane `z = 1`.
 const MAX_ANGLE: f64 = 89.0 * std::f64::consts::PI / 180.0;
 

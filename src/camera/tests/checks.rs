@@ -98,31 +98,92 @@ fn focal_lengths_that_no_lens_has_are_refused() {
 
 #[test]
 fn a_principal_point_may_lie_outside_the_image_but_not_anywhere() {
-    let mut far = sound();
-    far.k[2] = -3000.0;
-    assert!(Camera::from_info(&far, false).is_ok());
+    // A quarter of a sensor, cut from its corner, with the calibration of the whole.
+    let mut corner = sound();
+    corner.k[2] = 2.0 * 508.0;
+    corner.k[5] = -412.0;
+    assert!(Camera::from_info(&corner, false).is_ok());
     assert_eq!(
-        raw(|info| info.k[5] = -1.5e6),
+        raw(|info| info.k[2] = 1223.5),
+        "the principal point (1223.5, 206) of k lies more than one image size outside the image of 508x412: the \
+         calibration belongs to another resolution, or the image is a region of a larger one (set roi, and width and \
+         height of the full image)"
+    );
+    assert!(rectified(|info| info.p[6] = -413.0).contains("of p lies more than"));
+    assert_eq!(
+        raw(|info| {
+            (info.width, info.height) = (0, 0);
+            info.k[5] = -1.5e6;
+        }),
         "k[5], the principal point, must be within 1e6 px of the image, got -1500000.0"
     );
 }
 
 #[test]
+fn width_and_height_in_each_others_place_are_noticed() {
+    assert_eq!(
+        raw(|info| (info.width, info.height) = (412, 508)),
+        "width 412 and height 508 are exchanged, or belong to another calibration: the principal point (254, 206) is \
+         the centre of an image of 508x412"
+    );
+    // Off the centre, but not at that of the exchanged image either: a cropped camera.
+    let mut cropped = sound();
+    (cropped.k[2], cropped.k[5]) = (300.0, 160.0);
+    assert!(Camera::from_info(&cropped, false).is_ok());
+}
+
+#[test]
+fn intrinsics_with_the_binning_already_applied_are_noticed() {
+    let binned = |info: &mut CameraInfo| {
+        (info.binning_x, info.binning_y) = (2, 2);
+        for index in [0, 2, 4, 5] {
+            info.k[index] /= 2.0;
+        }
+    };
+    assert_eq!(
+        raw(binned),
+        "the principal point (127, 103) of k is the centre of the image after binning by 2x2: k and p belong to full \
+         resolution, or binning to 1"
+    );
+}
+
+#[test]
 fn skew_and_entries_that_a_matrix_fixes_are_refused() {
-    assert_eq!(raw(|info| info.k[1] = 0.5), "k[1] must be 0, got 0.5");
+    assert_eq!(
+        raw(|info| info.k[1] = 0.5),
+        "k[1], the skew, must be 0 (up to 5.7e-4 px), got 0.5"
+    );
     assert_eq!(raw(|info| info.k[8] = 0.0), "k[8] must be 1, got 0.0");
-    for index in [1, 3, 6, 7, 8] {
+    for (rectified, index) in [(false, 1), (true, 1)] {
+        assert!(matches!(
+            refusal(rectified, |info| {
+                info.k[index] = 2.0;
+                info.p[index] = 2.0;
+            }),
+            CameraError::Skew { .. }
+        ));
+    }
+    for index in [3, 6, 7, 8] {
         assert!(matches!(
             refusal(false, |info| info.k[index] = 2.0),
             CameraError::FixedEntry { array: "k", .. }
         ));
     }
-    for index in [1, 4, 8, 9, 10, 11] {
+    for index in [4, 8, 9, 10, 11] {
         assert!(matches!(
             refusal(true, |info| info.p[index] = 2.0),
             CameraError::FixedEntry { array: "p", .. }
         ));
     }
+}
+
+#[test]
+fn skew_that_is_rounding_of_a_calibration_passes() {
+    let mut dusty = sound();
+    dusty.k[1] = -1.0e-7;
+    dusty.p[1] = 1.0e-7;
+    assert!(Camera::from_info(&dusty, false).is_ok());
+    assert!(Camera::from_info(&dusty, true).is_ok());
 }
 
 #[test]
@@ -144,6 +205,10 @@ fn an_unknown_lens_is_refused_by_name() {
         "distortion model `division` with d = [-0.2, 0.05, 0.0, 0.0, 0.0] is not known; known are plumb_bob, \
          rational_polynomial, equidistant"
     );
+    assert!(
+        raw(|info| info.distortion_model = "fisheye".to_owned())
+            .ends_with("; ROS calls OpenCV's fisheye model (4 coefficients) `equidistant`")
+    );
     assert!(matches!(
         refusal(false, |info| info.distortion_model.clear()),
         CameraError::UnknownDistortionModel { .. }
@@ -164,26 +229,32 @@ fn another_number_of_coefficients_than_the_lens_has_is_refused() {
         with("plumb_bob", &[-0.2, 0.05, 0.0])
             .expect_err("too few")
             .to_string(),
-        "distortion model `plumb_bob` needs 4 or 5 coefficients, got 3: d = [-0.2, 0.05, 0.0]"
+        "distortion model `plumb_bob` needs 4 or 5 coefficients (more only if those are 0), got 3: d = [-0.2, 0.05, 0.0]"
     );
-    assert!(with("plumb_bob", &[-0.2, 0.05, 0.0, 0.0]).is_ok());
-    assert!(with("plumb_bob", &[-0.2, 0.05, 0.0, 0.0, 0.0, 0.1]).is_err());
-    assert!(with("rational_polynomial", &[-0.2; 5]).is_err());
-    assert!(with("rational_polynomial", &[0.01; 8]).is_ok());
-    let longer = |last: f64| {
-        [
-            0.01, 0.01, 0.0, 0.0, 0.01, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0, last,
-        ]
-    };
-    assert!(with("rational_polynomial", &longer(0.0)).is_ok());
-    assert!(matches!(
-        with("rational_polynomial", &longer(0.1)),
-        Err(CameraError::CoefficientCount { got: 12, .. })
-    ));
-    for count in [0, 3, 5, 8] {
-        assert!(with("equidistant", &vec![0.01; count]).is_err(), "{count}");
+    for (model, most) in [
+        ("plumb_bob", 5),
+        ("rational_polynomial", 8),
+        ("equidistant", 4),
+    ] {
+        for count in 1..4 {
+            assert!(with(model, &vec![0.01; count]).is_err(), "{model} {count}");
+        }
+        // Missing coefficients at the end are 0, and zeros after the last one say nothing.
+        for count in 4..=most {
+            let mut d = vec![0.01; count];
+            let short = with(model, &d).expect("as many as calibrations give");
+            d.resize(most, 0.0);
+            assert_eq!(with(model, &d).as_ref(), Ok(&short), "{model} {count}");
+            d.resize(14, 0.0);
+            assert_eq!(with(model, &d).as_ref(), Ok(&short), "{model} {count}");
+        }
+        let mut longer = vec![0.01; most];
+        longer.extend([0.0, 0.1]);
+        assert!(matches!(
+            with(model, &longer),
+            Err(CameraError::CoefficientCount { .. })
+        ));
     }
-    assert!(with("equidistant", &[0.01; 4]).is_ok());
 }
 
 #[test]

@@ -172,7 +172,7 @@ fn a_pole_of_a_rational_lens_is_never_reached() {
         "rational_polynomial",
         &[0.0, 0.0, 0.0, 0.0, 0.0, -4.0, 0.0, 0.0],
     );
-    assert!(camera.project(Ray { x: 0.49, y: 0.0 }).is_some());
+    assert!(camera.project(Ray { x: 0.3, y: 0.0 }).is_some());
     assert_eq!(camera.project(Ray { x: 0.5, y: 0.0 }), None);
     assert_eq!(camera.project(Ray { x: 0.51, y: 0.0 }), None);
     assert!(camera.ray_from_pixel(Pixel { u: 1.0e9, v: 0.0 }).is_err());
