@@ -32,5 +32,6 @@ pub mod ros;
 pub mod simulation;
 pub mod target;
 mod text;
+pub mod text_file;
 pub mod tracking;
 pub mod yaml;

@@ -111,6 +111,9 @@ fn plainly(error: &Error, text: &str, location: Location) -> String {
                 clip(key.as_deref().unwrap_or_default())
             )
         }
+        Error::MultipleDocuments { .. } => {
+            "expected one document, got a second one after `---`".to_owned()
+        }
         other => DefaultMessageFormatter.format_message(other).into_owned(),
     }
 }

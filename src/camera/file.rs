@@ -1,10 +1,15 @@
 //! The calibration file of ROS's `camera_calibration_parsers` -> a [`CameraInfo`].
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_saphyr::Spanned;
 
-use super::CameraInfo;
+use super::{CameraInfo, RegionOfInterest};
+use crate::text::{clip, list};
 use crate::yaml::{self, Place, YamlError};
 
 /// Why a calibration file cannot be read; each message begins with the place at fault.
@@ -43,8 +48,46 @@ pub enum CameraFileError {
     },
 }
 
+/// What was assumed or passed over in a calibration file that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CameraFileWarning {
+    /// No lens model is named.
+    ModelAssumed {
+        /// What the file is called.
+        source: String,
+    },
+    /// Keys that the format does not have.
+    UnknownKeys {
+        /// What the file is called.
+        source: String,
+        /// Their names, in the order of the alphabet.
+        keys: Vec<String>,
+    },
+}
+
+impl fmt::Display for CameraFileWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ModelAssumed { source } => write!(
+                f,
+                "{}: no distortion_model, {ASSUMED_MODEL} assumed",
+                clip(source)
+            ),
+            Self::UnknownKeys { source, keys } => write!(
+                f,
+                "{}: keys not in the format are ignored: {}",
+                clip(source),
+                list(keys)
+            ),
+        }
+    }
+}
+
+/// What ROS's reader takes for the lens model where a file names none.
+const ASSUMED_MODEL: &str = "plumb_bob";
+
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct RawInfo {
     image_width: u32,
     image_height: u32,
@@ -52,10 +95,18 @@ struct RawInfo {
     #[serde(rename = "camera_name", default)]
     _camera_name: Option<IgnoredAny>,
     camera_matrix: RawMatrix,
-    distortion_model: String,
+    distortion_model: Option<String>,
     distortion_coefficients: RawMatrix,
     rectification_matrix: RawMatrix,
     projection_matrix: RawMatrix,
+    #[serde(default)]
+    binning_x: u32,
+    #[serde(default)]
+    binning_y: u32,
+    #[serde(default)]
+    roi: RawRegion,
+    #[serde(flatten)]
+    unknown: BTreeMap<String, IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -66,14 +117,27 @@ struct RawMatrix {
     data: Spanned<Vec<Spanned<f64>>>,
 }
 
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawRegion {
+    x_offset: u32,
+    y_offset: u32,
+    height: u32,
+    width: u32,
+    do_rectify: bool,
+}
+
 impl CameraInfo {
-    /// Returns the camera info that a calibration file describes: whole image, no binning.
+    /// Returns the camera info that a calibration file describes, and what had to be assumed.
     ///
-    /// The shape is that of `config/cameras/paper.yaml`, which is what `camera_calibration` writes.
-    /// Only the shape is checked; [`super::Camera::from_info`] checks what the numbers mean.
+    /// The shape is that of `config/cameras/paper.yaml`, which `camera_calibration` writes; since `image_common`
+    /// 4.1.0 ROS adds binning and region of interest. Only the shape is checked; [`super::Camera::from_info`] checks
+    /// what the numbers mean.
     ///
     /// # Inputs
-    /// * `text`: the YAML; an unknown or missing key is an error, only `camera_name` may be left out.
+    /// * `text`: the YAML. As in ROS's own reader `camera_name`, binning and region may be left out, a missing
+    ///   `distortion_model` is `plumb_bob` (with a warning), the coefficients may stand in a row or a column, and
+    ///   unknown keys are passed over (with a warning). A first line `%YAML:1.0`, as `OpenCV` writes it, is skipped.
     /// * `source`: what errors call the text, usually its path.
     ///
     /// # Errors
@@ -82,24 +146,43 @@ impl CameraInfo {
     /// ```
     /// use tanker_pose::camera::{Camera, CameraInfo};
     ///
-    /// let info = CameraInfo::from_yaml(include_str!("../../config/cameras/paper.yaml"), "paper.yaml")?;
+    /// let text = include_str!("../../config/cameras/paper.yaml");
+    /// let (info, warnings) = CameraInfo::from_yaml(text, "paper.yaml")?;
     /// let camera = Camera::from_info(&info, false)?;
     /// assert_eq!(camera.pinhole(), Some([571.0, 571.0, 254.0, 206.0]));
+    /// assert!(warnings.is_empty());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn from_yaml(text: &str, source: &str) -> Result<Self, CameraFileError> {
-        let raw: RawInfo = yaml::read(text, source)?;
+    pub fn from_yaml(
+        text: &str,
+        source: &str,
+    ) -> Result<(Self, Vec<CameraFileWarning>), CameraFileError> {
+        // Not YAML's own directive, which has a space for the colon: a comment, so that lines keep their numbers.
+        let text = match text.strip_prefix("%YAML:") {
+            Some(rest) => Cow::Owned(format!("#YAML:{rest}")),
+            None => Cow::Borrowed(text),
+        };
+        let raw: RawInfo = yaml::read(&text, source)?;
+        let mut warnings = Vec::new();
+        if raw.distortion_model.is_none() {
+            warnings.push(CameraFileWarning::ModelAssumed {
+                source: source.to_owned(),
+            });
+        }
+        if !raw.unknown.is_empty() {
+            warnings.push(CameraFileWarning::UnknownKeys {
+                source: source.to_owned(),
+                keys: raw.unknown.into_keys().collect(),
+            });
+        }
         let coefficients = &raw.distortion_coefficients;
-        Ok(Self {
+        let info = Self {
             width: raw.image_width,
             height: raw.image_height,
-            distortion_model: raw.distortion_model,
-            d: coefficients.read(
-                source,
-                "distortion_coefficients",
-                1,
-                coefficients.cols.value,
-            )?,
+            distortion_model: raw
+                .distortion_model
+                .unwrap_or_else(|| ASSUMED_MODEL.to_owned()),
+            d: coefficients.any_size(source, "distortion_coefficients")?,
             k: raw.camera_matrix.fixed(source, "camera_matrix", 3, 3)?,
             r: raw
                 .rectification_matrix
@@ -107,8 +190,17 @@ impl CameraInfo {
             p: raw
                 .projection_matrix
                 .fixed(source, "projection_matrix", 3, 4)?,
-            ..Self::default()
-        })
+            binning_x: raw.binning_x,
+            binning_y: raw.binning_y,
+            roi: RegionOfInterest {
+                x_offset: raw.roi.x_offset,
+                y_offset: raw.roi.y_offset,
+                height: raw.roi.height,
+                width: raw.roi.width,
+                do_rectify: raw.roi.do_rectify,
+            },
+        };
+        Ok((info, warnings))
     }
 }
 
@@ -138,9 +230,26 @@ impl RawMatrix {
                 need_cols,
             });
         }
+        self.numbers(source, matrix, need_rows.saturating_mul(need_cols))
+    }
+
+    /// Returns the entries of a matrix whose size is the file's choice: a row, a column, any.
+    fn any_size(&self, source: &str, matrix: &'static str) -> Result<Vec<f64>, CameraFileError> {
+        // Saturating: no product of the file's numbers may overflow.
+        self.numbers(
+            source,
+            matrix,
+            self.rows.value.saturating_mul(self.cols.value),
+        )
+    }
+
+    fn numbers(
+        &self,
+        source: &str,
+        matrix: &'static str,
+        need: usize,
+    ) -> Result<Vec<f64>, CameraFileError> {
         let data = &self.data.value;
-        // Written so that no product can overflow: rows is 1 where columns are the file's choice.
-        let need = need_rows.saturating_mul(need_cols);
         if data.len() != need {
             let place = Place::at(source, self.data.referenced);
             return Err(CameraFileError::DataLength {
@@ -210,7 +319,7 @@ mod tests {
 
     #[test]
     fn the_papers_camera_is_read_as_it_stands() {
-        let info = CameraInfo::from_yaml(PAPER, "paper.yaml").expect("a good file");
+        let (info, warnings) = CameraInfo::from_yaml(PAPER, "paper.yaml").expect("a good file");
         let expected = CameraInfo {
             height: 412,
             width: 508,
@@ -223,7 +332,7 @@ mod tests {
             ],
             ..CameraInfo::default()
         };
-        assert_eq!(info, expected);
+        assert_eq!((info, warnings), (expected, Vec::new()));
     }
 
     #[test]
@@ -247,9 +356,9 @@ mod tests {
             refusal("cols: 5", "cols: 4"),
             "c.yaml:12:9: data of distortion_coefficients must hold 4 numbers, got 5"
         );
-        assert!(
-            refusal("rows: 1", "rows: 2")
-                .starts_with("c.yaml:10:9: distortion_coefficients must have 1 x 5")
+        assert_eq!(
+            refusal("rows: 1", "rows: 2"),
+            "c.yaml:12:9: data of distortion_coefficients must hold 10 numbers, got 5"
         );
     }
 
@@ -269,10 +378,8 @@ mod tests {
         let slips = [
             ("image_width: 508", "image_width: -508", 1),
             ("image_width: 508", "image_width: 508.5", 1),
-            ("image_height: 412", "image_heigth: 412", 2),
-            ("camera_name: paper", "camera_name: paper\nbinning: 2", 4),
+            ("image_width: 508", "image_width: 508\nimage_width: 508", 2),
             ("  rows: 1\n", "", 11),
-            ("distortion_model: plumb_bob", "distortion_model:", 8),
         ];
         for (line, replacement, at) in slips {
             let error = refusal(line, replacement);
@@ -284,9 +391,72 @@ mod tests {
     }
 
     #[test]
-    fn no_key_but_the_name_may_be_left_out() {
+    fn the_name_may_be_left_out_and_the_size_may_not() {
         assert!(CameraInfo::from_yaml(&with("camera_name: paper\n", ""), "c.yaml").is_ok());
-        assert!(refusal("distortion_model: plumb_bob\n", "").contains("distortion_model"));
         assert!(refusal("image_width: 508\n", "").contains("image_width"));
+        assert!(refusal("image_height: 412", "image_heigth: 412").contains("image_height"));
+    }
+
+    #[test]
+    fn what_ros_itself_assumes_or_passes_over_is_read_with_a_warning() {
+        let read = |text: &str| {
+            let (info, warnings) = CameraInfo::from_yaml(text, "c.yaml").expect("ROS reads it");
+            let words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+            (info, words.join("; "))
+        };
+        let (info, warnings) = read(&with("distortion_model: plumb_bob\n", ""));
+        assert_eq!(info.distortion_model, "plumb_bob");
+        assert_eq!(warnings, "c.yaml: no distortion_model, plumb_bob assumed");
+        let (_, warnings) = read(&with(
+            "camera_name: paper",
+            "camera_name: paper\nfov: 2\nage: 3",
+        ));
+        assert_eq!(
+            warnings,
+            "c.yaml: keys not in the format are ignored: \"age\", \"fov\""
+        );
+    }
+
+    #[test]
+    fn coefficients_may_stand_in_a_column() {
+        let column = with("rows: 1\n  cols: 5", "rows: 5\n  cols: 1");
+        let (info, _) = CameraInfo::from_yaml(&column, "c.yaml").expect("ROS reads it");
+        assert_eq!(info.d, [0.0; 5]);
+    }
+
+    #[test]
+    fn binning_and_region_are_read() {
+        let region = "binning_x: 2\nbinning_y: 4\nroi:\n  x_offset: 8\n  y_offset: 4\n  height: 200\n  width: 300\n  \
+                      do_rectify: true\n";
+        let (info, warnings) =
+            CameraInfo::from_yaml(&format!("{PAPER}{region}"), "c.yaml").expect("ROS writes it");
+        assert_eq!((info.binning_x, info.binning_y), (2, 4));
+        let roi = info.roi;
+        assert_eq!(
+            (
+                roi.x_offset,
+                roi.y_offset,
+                roi.width,
+                roi.height,
+                roi.do_rectify
+            ),
+            (8, 4, 300, 200, true)
+        );
+        assert_eq!(warnings, []);
+    }
+
+    #[test]
+    fn opencvs_directive_is_skipped_and_two_cameras_in_a_file_are_refused_in_a_users_words() {
+        let opencv = format!("%YAML:1.0\n{PAPER}");
+        assert!(CameraInfo::from_yaml(&opencv, "c.yaml").is_ok());
+        assert!(CameraInfo::from_yaml(&format!("%YAML:1.0\n---\n{PAPER}"), "c.yaml").is_ok());
+        let two = format!("{PAPER}---\n{PAPER}");
+        let error = CameraInfo::from_yaml(&two, "c.yaml").expect_err("which camera?");
+        assert!(
+            error
+                .to_string()
+                .ends_with(": expected one document, got a second one after `---`"),
+            "{error}"
+        );
     }
 }

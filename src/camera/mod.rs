@@ -22,7 +22,7 @@ mod tests;
 use nalgebra::{Matrix2, Point2};
 
 pub use error::{CameraError, UndistortError};
-pub use file::CameraFileError;
+pub use file::{CameraFileError, CameraFileWarning};
 pub use info::{CameraInfo, RegionOfInterest};
 
 use distortion::{Lens, Outside};

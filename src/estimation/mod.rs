@@ -250,7 +250,8 @@ pub enum EstimateError {
     },
     /// The best fit puts a marker behind the lens.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts marker {id} at depth {depth_m:.1} m"
+        "expected every marker in front of the camera, but the best fit puts marker {id} at depth {} m",
+        crate::text::digits(*depth_m)
     )]
     BehindCamera {
         /// Its marker id.

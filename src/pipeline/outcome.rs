@@ -4,7 +4,7 @@ use crate::camera::CameraError;
 use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
 
 use super::{FrameTrack, Stamp};
-use crate::text::{clip, list};
+use crate::text::{clip, digits, list};
 
 /// Why a frame gives no pose. Each says what was expected and what came.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -149,7 +149,8 @@ pub enum Refusal {
     },
     /// The best fit is a mirror image.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts id {id} at depth {depth_m:.1} m: ids exchanged, or a wrong detection?"
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m: ids exchanged, or a wrong detection?",
+        digits(*depth_m)
     )]
     BehindCamera {
         /// Marker id.
@@ -159,7 +160,8 @@ pub enum Refusal {
     },
     /// The residuals are larger than the sigmas promise.
     #[error(
-        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {rms_px:.2} px): a wrong detection or id, or a sigma too small?"
+        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): a wrong detection or id, or a sigma too small?",
+        digits(*rms_px)
     )]
     NotTrusted {
         /// Of the best fit.

@@ -271,7 +271,7 @@ pub(super) fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
         return Ok(map);
     }
     let path = PathBuf::from(name);
-    let text = std::fs::read_to_string(&path)
+    let text = crate::text_file::read(&path)
         .map_err(|source| NodeError::MapUnreadable { path, source })?;
     Ok(MarkerMap::from_yaml(&text, name)?)
 }

@@ -66,7 +66,7 @@ pub enum ParameterFileError {
 /// # Errors
 /// [`ParameterFileError`] names the file, and the line where there is one.
 pub fn read(path: &Path, node: &str) -> Result<Option<Vec<FileParameter>>, ParameterFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ParameterFileError::Unreadable {
+    let text = crate::text_file::read(path).map_err(|source| ParameterFileError::Unreadable {
         path: path.to_owned(),
         source,
     })?;

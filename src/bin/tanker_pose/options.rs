@@ -1,13 +1,15 @@
 //! Command-line options that several tools share.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nalgebra::Rotation3;
+use tanker_pose::camera::{CameraFileError, CameraInfo};
 use tanker_pose::config::nominal_camera_from_tanker;
 use tanker_pose::estimation::{EstimatorSettings, Initialisation, Refinement};
 use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
 use tanker_pose::target::MarkerMap;
+use tanker_pose::text_file;
 
 /// How a pose is found and judged; the same words as the node's parameters.
 #[derive(Debug, Clone, Args)]
@@ -123,10 +125,35 @@ pub fn marker_map(name_or_path: &str) -> Result<MarkerMap, String> {
     if let Some(map) = MarkerMap::shipped(name_or_path) {
         return Ok(map);
     }
-    let text = std::fs::read_to_string(Path::new(name_or_path)).map_err(|error| {
+    let text = text_file::read(Path::new(name_or_path)).map_err(|error| {
         format!("{name_or_path}: {error} (expected paper, fin6 or the path of a marker map)")
     })?;
     MarkerMap::from_yaml(&text, name_or_path).map_err(|error| error.to_string())
+}
+
+/// Why a camera's calibration file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    #[error("cannot read the camera's calibration {}: {source}", path.display())]
+    Unreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("cannot use the camera's calibration: {0}")]
+    File(#[from] CameraFileError),
+}
+
+/// Returns the camera info of a calibration file; what was assumed or passed over is logged.
+pub fn calibration(path: &Path) -> Result<CameraInfo, CalibrationError> {
+    let text = text_file::read(path).map_err(|source| CalibrationError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    let (info, warnings) = CameraInfo::from_yaml(&text, &path.display().to_string())?;
+    for warning in warnings {
+        eprintln!("tanker_pose: warning: {warning}");
+    }
+    Ok(info)
 }
 
 /// Returns a parser of numbers within bounds.

@@ -73,7 +73,7 @@ pub fn refuelling_setup(
         return Ok(None);
     };
     let path = PathBuf::from(name);
-    let text = std::fs::read_to_string(&path)
+    let text = crate::text_file::read(&path)
         .map_err(|source| ConsumersError::Unreadable { path, source })?;
     Ok(Some(RefuellingSetup::from_yaml(&text, name)?))
 }

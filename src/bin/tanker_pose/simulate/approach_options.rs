@@ -4,11 +4,11 @@ use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 
 use clap::Args;
-use tanker_pose::camera::{Camera, CameraError, CameraFileError, CameraInfo};
+use tanker_pose::camera::{Camera, CameraError, CameraInfo};
 use tanker_pose::simulation::{Approach, ApproachSettings};
 use tanker_pose::target::MarkerMap;
 
-use crate::options::{self, between};
+use crate::options::{self, CalibrationError, between};
 
 /// The camera of the paper, for those who name none.
 pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");
@@ -51,13 +51,8 @@ pub struct ApproachOptions {
 pub enum ApproachError {
     #[error("cannot use the marker map: {0}")]
     MarkerMap(String),
-    #[error("cannot read the camera's calibration {}: {source}", path.display())]
-    CameraUnreadable {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error("cannot use the camera's calibration: {0}")]
-    CameraFile(#[from] CameraFileError),
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
     #[error("cannot use the camera's calibration: {0}")]
     Camera(#[from] CameraError),
     #[error("expected at least one frame, but {duration_s} s at {rate_hz} Hz have none")]
@@ -68,16 +63,12 @@ impl ApproachOptions {
     /// Returns the approach, and the camera info that goes with it.
     pub fn read(&self) -> Result<(Approach, CameraInfo), ApproachError> {
         let info = match &self.camera {
-            None => CameraInfo::from_yaml(PAPER_CAMERA, "paper.yaml")?,
-            Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|source| {
-                    ApproachError::CameraUnreadable {
-                        path: path.clone(),
-                        source,
-                    }
-                })?;
-                CameraInfo::from_yaml(&text, &path.display().to_string())?
+            None => {
+                CameraInfo::from_yaml(PAPER_CAMERA, "paper.yaml")
+                    .map_err(CalibrationError::from)?
+                    .0
             }
+            Some(path) => options::calibration(path)?,
         };
         let approach = Approach::new(
             self.settings(),

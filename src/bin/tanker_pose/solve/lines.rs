@@ -1,5 +1,6 @@
 //! The lines that `solve` reads and writes.
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use tanker_pose::camera::{CameraInfo, RegionOfInterest};
 use tanker_pose::estimation::Solution;
@@ -9,28 +10,34 @@ use tanker_pose::pipeline::{Detection, FrameOutcome};
 const MALFORMED: &str = "malformed";
 
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct InputFrame {
     #[serde(default)]
     pub id: serde_json::Value,
-    pub camera: InputCamera,
+    /// May be left out where `--camera` names a calibration.
+    pub camera: Option<InputCamera>,
     pub points: Vec<InputPoint>,
 }
 
+/// A `CameraInfo`, as ROS 2 or ROS 1 prints it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputCamera {
+    #[serde(rename = "header", default)]
+    _header: Option<IgnoredAny>,
     #[serde(default)]
     width: u32,
     #[serde(default)]
     height: u32,
     #[serde(default)]
     distortion_model: String,
-    #[serde(default)]
+    #[serde(default, alias = "D")]
     d: Vec<f64>,
+    #[serde(alias = "K")]
     k: [f64; 9],
-    #[serde(default)]
+    #[serde(default, alias = "R")]
     r: [f64; 9],
-    #[serde(default)]
+    #[serde(default, alias = "P")]
     p: Vec<f64>,
     #[serde(default)]
     binning_x: u32,

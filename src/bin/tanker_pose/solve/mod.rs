@@ -18,7 +18,12 @@ use tanker_pose::pipeline::{self, Detection, FrameOutcome, Refusal, observe};
 use tanker_pose::target::MarkerMap;
 
 use self::lines::{InputFrame, InputPoint, OutputFrame, reason};
-use crate::options::{self, EstimatorOptions};
+use crate::options::{self, CalibrationError, EstimatorOptions};
+
+/// Longest line that is read: a frame of ten thousand points.
+const MAX_LINE_BYTES: u64 = 1 << 20;
+/// What is passed over in search of the end of a longer one.
+const MAX_SKIPPED_BYTES: u64 = 1 << 28;
 
 /// m; a marker farther from the tanker's origin is a mistake in units.
 const MAX_COORDINATE_M: f64 = 1e3;
@@ -31,6 +36,9 @@ pub struct Arguments {
     /// Marker map (paper, fin6 or a path) for points that bring no x, y, z
     #[arg(long, value_name = "MAP")]
     marker_map: Option<String>,
+    /// Calibration file, as ROS writes it, for lines that bring no camera
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
     /// Pixels are those of the rectified image: use p instead of k and d
     #[arg(long)]
     rectified: bool,
@@ -48,6 +56,10 @@ pub enum SolveError {
     },
     #[error("cannot use the marker map: {0}")]
     MarkerMap(String),
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    #[error("cannot read line {number}: it has no end within {limit} bytes")]
+    EndlessLine { number: u64, limit: u64 },
     #[error("cannot read the input: {0}")]
     Read(std::io::Error),
     #[error("cannot write the output: {0}")]
@@ -86,9 +98,36 @@ pub fn run(arguments: &Arguments) -> Result<(), SolveError> {
     }
 }
 
+/// Returns how many bytes the next line has, 0 at the end of the input; of a line that is too long only the beginning
+/// is kept.
+fn read_line(input: &mut impl BufRead, line: &mut Vec<u8>, number: u64) -> Result<u64, SolveError> {
+    line.clear();
+    let mut bytes = 0;
+    loop {
+        let chunk = input.fill_buf().map_err(SolveError::Read)?;
+        let end = chunk.iter().position(|&byte| byte == b'\n');
+        let taken = end.map_or(chunk.len(), |end| end + 1);
+        if bytes <= MAX_LINE_BYTES {
+            line.extend_from_slice(&chunk[..taken]);
+        }
+        input.consume(taken);
+        bytes += taken as u64;
+        if end.is_some() || taken == 0 {
+            return Ok(bytes);
+        }
+        if bytes > MAX_SKIPPED_BYTES {
+            return Err(SolveError::EndlessLine {
+                number,
+                limit: MAX_SKIPPED_BYTES,
+            });
+        }
+    }
+}
+
 struct Solver {
     estimator: Estimator,
     map: Option<MarkerMap>,
+    calibration: Option<CameraInfo>,
     rectified: bool,
     pixel_sigma_px: f64,
     camera: Option<(CameraInfo, Result<Camera, CameraError>)>,
@@ -105,6 +144,11 @@ impl Solver {
         Ok(Self {
             estimator: Estimator::new(arguments.estimator.settings()),
             map: map.map_err(SolveError::MarkerMap)?,
+            calibration: arguments
+                .camera
+                .as_deref()
+                .map(options::calibration)
+                .transpose()?,
             rectified: arguments.rectified,
             pixel_sigma_px: arguments.estimator.pixel_sigma_px,
             camera: None,
@@ -121,16 +165,15 @@ impl Solver {
         let mut line = Vec::new();
         let mut number = 0_u64;
         loop {
-            line.clear();
-            if input
-                .read_until(b'\n', &mut line)
-                .map_err(SolveError::Read)?
-                == 0
-            {
-                return output.flush().map_err(SolveError::Write);
-            }
             number += 1;
-            let answer = self.answer(&line, number);
+            let answer = match read_line(&mut input, &mut line, number)? {
+                0 => return output.flush().map_err(SolveError::Write),
+                bytes if bytes > MAX_LINE_BYTES => OutputFrame::malformed(
+                    serde_json::Value::Null,
+                    format!("line {number}: expected at most {MAX_LINE_BYTES} bytes, got {bytes}"),
+                ),
+                _ => self.answer(&line, number),
+            };
             serde_json::to_writer(&mut *output, &answer)
                 .map_err(|error| SolveError::Write(error.into()))?;
             output.write_all(b"\n").map_err(SolveError::Write)?;
@@ -167,7 +210,11 @@ impl Solver {
     }
 
     fn solve(&mut self, frame: &InputFrame) -> Result<FrameOutcome, String> {
-        let info = frame.camera.info()?;
+        let info = match (&frame.camera, &self.calibration) {
+            (Some(camera), _) => camera.info()?,
+            (None, Some(calibration)) => calibration.clone(),
+            (None, None) => return Err("expected a camera, or a file by --camera".to_owned()),
+        };
         let markers = frame
             .points
             .iter()
