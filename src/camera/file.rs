@@ -1,11 +1,10 @@
 //! The calibration file of ROS's `camera_calibration_parsers` -> a [`CameraInfo`].
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::fmt;
 
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use serde_saphyr::Spanned;
 
 use super::{CameraInfo, RegionOfInterest};
@@ -106,7 +105,7 @@ struct RawInfo {
     #[serde(default)]
     roi: RawRegion,
     #[serde(flatten)]
-    unknown: BTreeMap<String, IgnoredAny>,
+    unknown: UnknownKeys,
 }
 
 #[derive(Deserialize)]
@@ -115,6 +114,33 @@ struct RawMatrix {
     rows: Spanned<usize>,
     cols: Spanned<usize>,
     data: Spanned<Vec<Spanned<f64>>>,
+}
+
+/// Names of the keys that no field takes.
+#[derive(Default)]
+struct UnknownKeys(Vec<String>);
+
+impl<'de> Deserialize<'de> for UnknownKeys {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Names;
+        impl<'de> Visitor<'de> for Names {
+            type Value = UnknownKeys;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("keys with values")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<UnknownKeys, A::Error> {
+                let mut names = Vec::new();
+                while let Some((name, IgnoredAny)) = map.next_entry()? {
+                    names.push(name);
+                }
+                names.sort();
+                Ok(UnknownKeys(names))
+            }
+        }
+        deserializer.deserialize_map(Names)
+    }
 }
 
 #[derive(Default, Deserialize)]
@@ -169,10 +195,10 @@ impl CameraInfo {
                 source: source.to_owned(),
             });
         }
-        if !raw.unknown.is_empty() {
+        if !raw.unknown.0.is_empty() {
             warnings.push(CameraFileWarning::UnknownKeys {
                 source: source.to_owned(),
-                keys: raw.unknown.into_keys().collect(),
+                keys: raw.unknown.0,
             });
         }
         let coefficients = &raw.distortion_coefficients;

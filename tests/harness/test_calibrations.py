@@ -24,7 +24,7 @@ NOISE_PX = 0.2
 # Stretches of the lens, relative to the centre. The node's limits are 1e-3 at a fold and 10 on the way up to a pole,
 # and its valid region is a disc, while a tangential part makes the distance of both depend on the direction. So a pixel
 # must have a ray if no stretch on the way to it leaves the first range, and may have one only within the second.
-SURE = (0.06, 9.0)
+SURE = (0.03, 9.0)
 POSSIBLE = (0.5e-3, 20.0)
 PIXELS = np.stack(
     np.meshgrid(np.linspace(0, WIDTH - 1, 17), np.linspace(0, HEIGHT - 1, 13)), axis=-1
@@ -106,7 +106,7 @@ def reached(calibration: Calibration, stretches: tuple[float, float]) -> Array:
     ideal = np.zeros_like(targets)
     with np.errstate(all="ignore"):
         for part in np.linspace(0, 1, 101)[1:]:
-            ideal = follow(d, pole, ideal, part * targets[alive])
+            before, ideal = ideal, follow(d, pole, ideal, part * targets[alive])
             image, derivative = bend(d, ideal)
             finite = np.isfinite(derivative).all(axis=(1, 2))
             derivative[~finite] = 0.0
@@ -114,6 +114,8 @@ def reached(calibration: Calibration, stretches: tuple[float, float]) -> Array:
             good = finite & (np.linalg.norm(image - part * targets[alive], axis=1) < 1e-9)
             good &= (stretch[:, 0] > least) & (stretch[:, 1] < most)
             good &= (ideal * ideal).sum(axis=1) < pole
+            # Farther in one step than any lens in the range goes: over a fold, to its far side.
+            good &= np.linalg.norm(ideal - before, axis=1) < 0.3
             alive, ideal = alive[good], ideal[good]
     return np.isin(np.arange(len(targets)), alive)
 

@@ -67,7 +67,7 @@ impl BrownConrady {
                 .collect()
         };
         let mut limits = vec![less(MIN_STRETCH)];
-        if self.denominator != [1.0, 0.0, 0.0, 0.0] {
+        if self.denominator[1..].iter().any(|&member| member != 0.0) {
             limits.extend([less(MAX_STRETCH), d.to_vec()]);
         }
         limits
@@ -264,10 +264,10 @@ mod tests {
         let radial = [
             -13.238_113,
             -98.012_135,
-            1357.782_415,
+            1_357.782_415,
             -13.050_801,
             -102.363_353,
-            1383.055_291,
+            1_383.055_291,
         ];
         let lens = BrownConrady::new(radial, [0.001_444, 0.002_849]);
         assert!(lens.max_radius > 0.6, "{}", lens.max_radius);
