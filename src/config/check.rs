@@ -113,7 +113,7 @@ const fn type_name(kind: Kind) -> &'static str {
 }
 
 /// Returns the parameter that was perhaps meant: the nearest, if a third of its letters at most differ.
-fn nearest_name(name: &str) -> Option<&'static str> {
+pub(crate) fn nearest_name(name: &str) -> Option<&'static str> {
     TABLE
         .iter()
         .map(|spec| (edit_distance(name, spec.name), spec.name))

@@ -11,6 +11,7 @@ mod parameters;
 mod table;
 mod value;
 
+pub(crate) use check::nearest_name;
 pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
 pub use consumers::{AttitudeSource, ConsumerConfiguration, OutputError};
 pub use parameters::Parameters;
@@ -29,6 +30,6 @@ pub struct Settings {
     pub pixel_sigma_px: f64,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
-    /// How poses become a track; none: they don't. Out of the filter's ranges is none, too: the table allows no such values.
+    /// Track settings; `None` disables tracking. Settings out of the filter's ranges disable it too: the table allows none.
     pub track: Option<FilterSettings>,
 }

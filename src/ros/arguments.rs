@@ -3,7 +3,11 @@
 use std::path::PathBuf;
 
 use log::LevelFilter;
-use ros2args::{LogLevel, ParamAssignment, RemapRule, Ros2Args, Ros2ArgsError};
+use ros2args::{LogLevel, RemapRule, Ros2Args, Ros2ArgsError};
+
+use super::parameter_file;
+use crate::config::ParameterValue;
+use crate::text::clip;
 
 /// What `--help` prints.
 pub const HELP: &str = "\
@@ -36,10 +40,8 @@ All parameters stand with their defaults and comments in config/tanker_pose.yaml
 pub struct Arguments {
     /// Renames of the node and of its topics, in the order given.
     pub remaps: Vec<RemapRule>,
-    /// `-p` assignments, in the order given; they override the files.
-    pub parameters: Vec<ParamAssignment>,
-    /// Parameter files, in the order given; a later file overrides an earlier one.
-    pub parameter_files: Vec<PathBuf>,
+    /// `-p` and parameter files, in the order given; what counts of them, [`super::overrides`] says.
+    pub parameters: Vec<ParameterSource>,
     /// Log levels as (logger, level), in the order given; no logger: all of them.
     pub log_levels: Vec<(Option<String>, LevelFilter)>,
     /// Whether log messages go to /rosout.
@@ -48,13 +50,32 @@ pub struct Arguments {
     pub console_logs: bool,
 }
 
+/// What gives values to parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterSource {
+    /// `--params-file`.
+    File(PathBuf),
+    /// `-p`.
+    Assignment(Assignment),
+}
+
+/// `-p node:name:=value`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignment {
+    /// Base name of the node; none: every node.
+    pub node: Option<String>,
+    /// The parameter.
+    pub name: String,
+    /// None where something stands that no parameter can hold.
+    pub value: Option<ParameterValue>,
+}
+
 impl Default for Arguments {
     /// Returns what an empty command line says.
     fn default() -> Self {
         Self {
             remaps: Vec::new(),
             parameters: Vec::new(),
-            parameter_files: Vec::new(),
             log_levels: Vec::new(),
             rosout_logs: true,
             console_logs: true,
@@ -80,6 +101,23 @@ pub enum ArgumentError {
     /// A malformed ROS argument.
     #[error("{0}")]
     Ros(#[from] Ros2ArgsError),
+    /// A `-p` that is no assignment.
+    #[error(
+        "argument -p {}: {reason}; expected name:=value or node:name:=value",
+        clip(argument)
+    )]
+    Assignment {
+        /// What came.
+        argument: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An argument that stands last and needs another one behind it.
+    #[error("argument {argument} needs a value behind it")]
+    NoValue {
+        /// The argument.
+        argument: String,
+    },
     /// Not a ROS argument at all.
     #[error(
         "unexpected argument {argument:?}: this node takes ROS arguments only, after --ros-args"
@@ -125,11 +163,12 @@ impl Arguments {
     /// # Errors
     /// [`ArgumentError`] when a ROS argument is malformed or not supported.
     pub fn split(arguments: &[String]) -> Result<(Self, Vec<String>), ArgumentError> {
-        let (ros, others) = ros2args::parse_ros2_args(arguments)?;
-        Ok((Self::from_ros(ros)?, others))
+        let (rest, parameters) = take_parameters(arguments)?;
+        let (ros, others) = ros2args::parse_ros2_args(&rest)?;
+        Ok((Self::from_ros(ros, parameters)?, others))
     }
 
-    fn from_ros(ros: Ros2Args) -> Result<Self, ArgumentError> {
+    fn from_ros(ros: Ros2Args, parameters: Vec<ParameterSource>) -> Result<Self, ArgumentError> {
         if ros.log_config_file.is_some() {
             return Err(ArgumentError::Unsupported {
                 argument: "--log-config-file",
@@ -143,13 +182,94 @@ impl Arguments {
             .collect();
         Ok(Self {
             remaps: ros.remap_rules,
-            parameters: ros.param_assignments,
-            parameter_files: ros.param_files,
+            parameters,
             log_levels,
             rosout_logs: ros.logging_output.rosout.unwrap_or(true),
             console_logs: ros.logging_output.stdout.unwrap_or(true),
         })
     }
+}
+
+/// Returns the arguments without those that give values to parameters, and these in their order: the parser would part
+/// files from assignments, and read values by other rules than rcl.
+///
+/// Also takes away what ROS accepts and the parser does not: `--log-file-name` (the node writes no log file) and the
+/// level `UNSET`, which leaves levels as they are.
+fn take_parameters(
+    arguments: &[String],
+) -> Result<(Vec<String>, Vec<ParameterSource>), ArgumentError> {
+    let (mut rest, mut sources) = (Vec::new(), Vec::new());
+    let mut in_ros_arguments = false;
+    let mut arguments = arguments.iter();
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--ros-args" => in_ros_arguments = true,
+            "--" => in_ros_arguments = false,
+            _ => {}
+        }
+        let takes_value = matches!(
+            argument.as_str(),
+            "-p" | "--param" | "--params-file" | "--log-file-name" | "--log-level"
+        );
+        if !in_ros_arguments || !takes_value {
+            rest.push(argument.clone());
+            continue;
+        }
+        let value = arguments.next().ok_or_else(|| ArgumentError::NoValue {
+            argument: argument.clone(),
+        })?;
+        match argument.as_str() {
+            "-p" | "--param" => sources.push(ParameterSource::Assignment(assignment(value)?)),
+            "--params-file" => sources.push(ParameterSource::File(PathBuf::from(value))),
+            "--log-level" if !is_unset(value) => rest.extend([argument.clone(), value.clone()]),
+            _ => {}
+        }
+    }
+    Ok((rest, sources))
+}
+
+fn is_unset(level: &str) -> bool {
+    let level = level.rsplit_once(":=").map_or(level, |(_, level)| level);
+    level.eq_ignore_ascii_case("unset")
+}
+
+fn assignment(argument: &str) -> Result<Assignment, ArgumentError> {
+    let fault = |reason: String| ArgumentError::Assignment {
+        argument: argument.to_owned(),
+        reason,
+    };
+    let Some((target, word)) = argument.split_once(":=") else {
+        return Err(fault("it has no :=".to_owned()));
+    };
+    let (node, name) = match target.split_once(':') {
+        Some((node, name)) => (Some(node), name),
+        None => (None, target),
+    };
+    if let Some(node) = node.filter(|node| !is_base_name(node)) {
+        return Err(fault(format!(
+            "{:?} is not a node's name without its namespace",
+            clip(node)
+        )));
+    }
+    if name.is_empty() || name.contains(':') {
+        return Err(fault(format!("{:?} is no parameter", clip(name))));
+    }
+    if word.is_empty() {
+        return Err(fault("the value is missing".to_owned()));
+    }
+    let value = parameter_file::value(word).map_err(fault)?;
+    Ok(Assignment {
+        node: node.map(str::to_owned),
+        name: name.to_owned(),
+        value,
+    })
+}
+
+fn is_base_name(name: &str) -> bool {
+    let is_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+    !name.is_empty()
+        && name.chars().all(is_word)
+        && !name.starts_with(|first: char| first.is_ascii_digit())
 }
 
 /// The `log` crate knows nothing above error.
@@ -209,10 +329,17 @@ mod tests {
             unreachable!("expected a run, got {command:?}");
         };
         assert_eq!(arguments.remaps.len(), 2);
-        assert_eq!(arguments.parameters[0].as_i64(), Some(1));
         assert_eq!(
-            arguments.parameter_files,
-            [PathBuf::from("a.yaml"), PathBuf::from("b.yaml")]
+            arguments.parameters,
+            [
+                ParameterSource::Assignment(Assignment {
+                    node: None,
+                    name: "max_outliers".to_owned(),
+                    value: Some(ParameterValue::Integer(1)),
+                }),
+                ParameterSource::File(PathBuf::from("a.yaml")),
+                ParameterSource::File(PathBuf::from("b.yaml")),
+            ]
         );
         assert_eq!(
             arguments.log_levels,
@@ -220,6 +347,23 @@ mod tests {
                 (None, LevelFilter::Warn),
                 (Some("rustdds".to_owned()), LevelFilter::Debug)
             ]
+        );
+    }
+
+    #[test]
+    fn what_only_ros_has_a_use_for_is_accepted() {
+        let command = parse(&[
+            "--ros-args",
+            "--log-file-name",
+            "tanker",
+            "--log-level",
+            "UNSET",
+            "--log-level",
+            "rcl:=unset",
+        ]);
+        assert_eq!(
+            command.expect("ROS takes them"),
+            Command::Run(Arguments::default())
         );
     }
 
@@ -236,6 +380,12 @@ mod tests {
         for wrong in [
             &["--ros-args", "--params-file"][..],
             &["--ros-args", "-p", "a"],
+            &["--ros-args", "-p", "a:="],
+            &["--ros-args", "-p", ":=1"],
+            &["--ros-args", "-p", "/**:a:=1"],
+            &["--ros-args", "-p", "/tanker_pose:a:=1"],
+            &["--ros-args", "-p", "a:=@x"],
+            &["--ros-args", "--log-file-name"],
             &["--ros-args", "-r", "a"],
             &["--ros-args", "--log-level", "loud"],
             &["--ros-args", "--bogus"],

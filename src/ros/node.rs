@@ -27,7 +27,7 @@ use super::participant::{
 use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
 use super::serve::Server;
-use super::start_values::{StartParameterError, start_values};
+use super::start_values::{StartParameterError, StartValues, start_values};
 use crate::config::{AttitudeSource, Configuration};
 use crate::pipeline::Pipeline;
 use crate::refuelling::RefuellingSetup;
@@ -127,9 +127,7 @@ pub fn run_until(
     environment: &Environment,
     stop: impl Future<Output = ()>,
 ) -> Result<(), NodeError> {
-    let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
-    let qos = QosOverrides::new(endpoints(&names)?);
-    let mut start = start_values(arguments, &names.fully_qualified(), qos)?;
+    let (names, mut start) = effective_parameters(arguments)?;
     let configuration = Configuration::from(&start.parameters);
     // What is wrong with fixed parameters, no transition can mend.
     configuration
@@ -183,6 +181,17 @@ pub fn run_until(
     logging::stop_rosout();
     ros.close();
     served
+}
+
+/// Returns the node's names, and the parameters that it starts with under these arguments.
+///
+/// # Errors
+/// [`NodeError`] of a name, a file or a value.
+pub fn effective_parameters(arguments: &Arguments) -> Result<(NodeNames, StartValues), NodeError> {
+    let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
+    let qos = QosOverrides::new(endpoints(&names)?);
+    let start = start_values(arguments, &names.fully_qualified(), qos)?;
+    Ok((names, start))
 }
 
 /// Returns all topics that the node may have, for `qos_overrides`.

@@ -1,13 +1,10 @@
-//! Parameters at the start: defaults, then files, then arguments.
-
-use std::path::PathBuf;
-
-use ros2args::ParamAssignment;
+//! Parameters at the start: defaults, overridden by files and arguments.
 
 use super::arguments::Arguments;
-use super::parameter_file::{self, ParameterFileError};
+use super::overrides::{Override, Overrides, Place};
+use super::parameter_file::ParameterFileError;
 use super::qos_overrides::{self, QosOverrideError, QosOverrides};
-use crate::config::{ParameterError, ParameterValue, Parameters};
+use crate::config::{ParameterError, ParameterSpec, ParameterValue, Parameters, nearest_name};
 use crate::text::clip;
 
 /// Why the parameters given at the start cannot be used.
@@ -17,24 +14,19 @@ pub enum StartParameterError {
     /// A file.
     #[error(transparent)]
     File(#[from] ParameterFileError),
-    /// A value in a file.
-    #[error("parameter file {path:?}, line {line}: {source}")]
-    InFile {
-        /// The file.
-        path: PathBuf,
-        /// Where.
-        line: u64,
+    /// A value.
+    #[error("{place}: {source}")]
+    Value {
+        /// Where it stands.
+        place: Place,
         /// What is wrong.
         source: StartValueError,
     },
-    /// A value of `-p`.
-    #[error("argument -p: {0}")]
-    InArgument(StartValueError),
     /// A list, a map, or nothing where a value belongs.
     #[error("{place}: parameter {name:?} needs a bool, a number or text")]
     NoScalar {
-        /// File and line, or the argument.
-        place: String,
+        /// Where it stands.
+        place: Place,
         /// The parameter.
         name: String,
     },
@@ -63,8 +55,8 @@ pub struct StartValues {
     pub warnings: Vec<String>,
 }
 
-/// Returns the parameters of the node with this absolute name: defaults, overridden by the files in
-/// their order, overridden by `-p`; and so with `qos`.
+/// Returns the parameters of the node with this absolute name: defaults, overridden by files and `-p` in the order that
+/// [`Overrides`] says; and so with `qos`.
 ///
 /// # Errors
 /// [`StartParameterError`] names the parameter, and the file and line that it stands in.
@@ -78,45 +70,15 @@ pub fn start_values(
         qos,
         warnings: Vec::new(),
     };
-    for path in &arguments.parameter_files {
-        let Some(section) = parameter_file::read(path, node)? else {
-            found.warnings.push(format!(
-                "parameter file {} has no section for {node}",
-                path.display()
-            ));
-            continue;
-        };
-        for parameter in section {
-            let line = parameter.line;
-            let Some(value) = parameter.value else {
-                let place = format!("parameter file {}, line {line}", path.display());
-                return Err(StartParameterError::NoScalar {
-                    place,
-                    name: parameter.name,
-                });
-            };
-            found
-                .set(&parameter.name, value)
-                .map_err(|source| StartParameterError::InFile {
-                    path: path.clone(),
-                    line,
-                    source,
-                })?;
-        }
+    let overrides = Overrides::gather(&arguments.parameters, node)?;
+    for path in &overrides.files_without_section {
+        found.warnings.push(format!(
+            "parameter file {} has no section for {node}",
+            path.display()
+        ));
     }
-    let base_name = ros2args::extract_base_name(node);
-    for assignment in &arguments.parameters {
-        let applies = assignment.applies_to_node(base_name) || assignment.applies_to_node(node);
-        if !applies {
-            continue;
-        }
-        let value = scalar(assignment).ok_or_else(|| StartParameterError::NoScalar {
-            place: "argument -p".to_owned(),
-            name: assignment.name.clone(),
-        })?;
-        found
-            .set(&assignment.name, value)
-            .map_err(StartParameterError::InArgument)?;
+    for given in overrides.values {
+        found.take(given)?;
     }
     Ok(found)
 }
@@ -130,6 +92,33 @@ impl StartValues {
                 clip(&name)
             ));
         }
+    }
+
+    fn take(&mut self, given: Override) -> Result<(), StartParameterError> {
+        let is_known = given.name.starts_with(qos_overrides::PREFIX)
+            || ParameterSpec::find(&given.name).is_some();
+        // Below a pattern stand the parameters of many nodes.
+        if given.is_shared && !is_known {
+            let close = nearest_name(&given.name).map(|name| format!(", is {name} meant?"));
+            self.warnings.push(format!(
+                "{}: this node has no parameter {:?}{}",
+                given.place,
+                clip(&given.name),
+                close.unwrap_or_default()
+            ));
+            return Ok(());
+        }
+        let Some(value) = given.value else {
+            return Err(StartParameterError::NoScalar {
+                place: given.place,
+                name: clip(&given.name),
+            });
+        };
+        self.set(&given.name, value)
+            .map_err(|source| StartParameterError::Value {
+                place: given.place,
+                source,
+            })
     }
 
     fn set(&mut self, name: &str, value: ParameterValue) -> Result<(), StartValueError> {
@@ -149,23 +138,11 @@ impl StartValues {
     }
 }
 
-fn scalar(assignment: &ParamAssignment) -> Option<ParameterValue> {
-    assignment
-        .as_bool()
-        .map(ParameterValue::Bool)
-        .or_else(|| assignment.as_i64().map(ParameterValue::Integer))
-        .or_else(|| assignment.as_f64().map(ParameterValue::Double))
-        .or_else(|| {
-            assignment
-                .as_str()
-                .map(|text| ParameterValue::String(text.to_owned()))
-        })
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
+    use std::path::{Path, PathBuf};
 
+    use super::super::parameter_file;
     use super::super::participant::reliable;
     use super::super::qos_overrides::{Endpoint, Role};
     use super::*;
@@ -188,15 +165,15 @@ mod tests {
 
     #[test]
     fn shipped_parameter_file_lists_the_table_and_its_defaults() {
-        let section = parameter_file::read(&shipped_file(), "/tanker_pose")
-            .expect("the shipped file is valid")
-            .expect("the shipped file is for every node");
+        let sections = parameter_file::read(&shipped_file()).expect("the shipped file is valid");
+        assert_eq!(sections[0].pattern, "/**");
+        let section = &sections[0].parameters;
         let mut listed: Vec<&str> = section.iter().map(|p| p.name.as_str()).collect();
         listed.sort_unstable();
         let mut table: Vec<&str> = TABLE.iter().map(|spec| spec.name).collect();
         table.sort_unstable();
         assert_eq!(listed, table);
-        for parameter in &section {
+        for parameter in section {
             let spec = TABLE
                 .iter()
                 .find(|spec| spec.name == parameter.name)

@@ -2,6 +2,7 @@
 
 mod demo;
 mod options;
+mod parameters;
 mod reproduce;
 mod ros_options;
 mod simulate;
@@ -26,6 +27,7 @@ struct Arguments {
 enum Tool {
     Demo(demo::Arguments),
     Simulate(simulate::Arguments),
+    Parameters(parameters::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
     /// Reproduce the paper's experiments: tables and plots
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().tool {
         Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
         Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
+        Tool::Parameters(arguments) => parameters::run(&arguments).map_err(Into::into),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
         Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),
     };

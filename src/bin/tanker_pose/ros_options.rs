@@ -3,7 +3,8 @@
 use clap::Args;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments};
 use tanker_pose::ros::names::NodeNames;
-use tanker_pose::ros::parameter_file::{self, ParameterFileError};
+use tanker_pose::ros::overrides::{Overrides, Place};
+use tanker_pose::ros::parameter_file::ParameterFileError;
 
 /// Launch files set it for every node; a tool that takes no time from `/clock` need not mind.
 const SIM_TIME: &str = "use_sim_time";
@@ -56,22 +57,20 @@ pub fn check_no_parameters(
     names: &NodeNames,
 ) -> Result<Vec<String>, NoParametersError> {
     let node = names.fully_qualified();
-    for given in &arguments.parameters {
-        let is_ours = given.applies_to_node(names.base_name()) || given.applies_to_node(&node);
-        if is_ours && given.name != SIM_TIME {
-            let name = given.name.clone();
+    let mut warnings = Vec::new();
+    for given in Overrides::gather(&arguments.parameters, &node)?.values {
+        if given.name == SIM_TIME {
+            continue;
+        }
+        if given.place == Place::Argument {
+            let name = given.name;
             return Err(NoParametersError::InArgument { node, name });
         }
-    }
-    let mut warnings = Vec::new();
-    for path in &arguments.parameter_files {
-        let section = parameter_file::read(path, &node)?.unwrap_or_default();
-        if let Some(first) = section.iter().find(|parameter| parameter.name != SIM_TIME) {
+        // One is enough: a file for several nodes has many.
+        if warnings.is_empty() {
             warnings.push(format!(
-                "parameter file {}, line {}: {node} has no parameters, {:?} has no effect here",
-                path.display(),
-                first.line,
-                first.name
+                "{}: {node} has no parameters, {:?} has no effect here",
+                given.place, given.name
             ));
         }
     }

@@ -150,7 +150,7 @@ tags:
             point(3, 100.0, 50.0),
         ];
         assert_eq!(found.detections, expected);
-        assert_eq!(found.ignored_ids, []);
+        assert_eq!(found.ignored_ids, Vec::<u32>::new());
     }
 
     #[test]

@@ -1,0 +1,49 @@
+//! `tanker_pose parameters`: what the node would start with under given ROS arguments, without starting it.
+
+use std::io::Write;
+
+use tanker_pose::config::ParameterValue;
+use tanker_pose::ros::arguments::ArgumentError;
+use tanker_pose::ros::node::{NodeError, effective_parameters};
+
+use crate::ros_options::RosOptions;
+
+/// Print the parameters that the node would start with under the same ROS arguments, as a parameter file
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(flatten)]
+    ros: RosOptions,
+}
+
+/// Why there are none to print.
+#[derive(Debug, thiserror::Error)]
+pub enum ParametersError {
+    #[error(transparent)]
+    Arguments(#[from] ArgumentError),
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    #[error("cannot write the output: {0}")]
+    Write(#[from] std::io::Error),
+}
+
+/// Prints the parameters on standard output, and warnings on standard error.
+pub fn run(arguments: &Arguments) -> Result<(), ParametersError> {
+    let (names, start) = effective_parameters(&arguments.ros.read()?)?;
+    for warning in &start.warnings {
+        eprintln!("tanker_pose: warning: {warning}");
+    }
+    let mut output = std::io::stdout().lock();
+    writeln!(output, "{}:\n  ros__parameters:", names.fully_qualified())?;
+    for (name, value) in start.parameters.iter() {
+        match value {
+            ParameterValue::Bool(value) => writeln!(output, "    {name}: {value}")?,
+            ParameterValue::Integer(value) => writeln!(output, "    {name}: {value}")?,
+            ParameterValue::Double(value) => writeln!(output, "    {name}: {value:?}")?,
+            // JSON's strings are YAML's, too.
+            ParameterValue::String(value) => {
+                writeln!(output, "    {name}: {}", serde_json::json!(value))?;
+            }
+        }
+    }
+    Ok(())
+}
