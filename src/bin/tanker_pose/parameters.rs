@@ -21,14 +21,14 @@ pub enum ParametersError {
     #[error(transparent)]
     Arguments(#[from] ArgumentError),
     #[error(transparent)]
-    Node(#[from] NodeError),
+    Node(#[from] Box<NodeError>),
     #[error("cannot write the output: {0}")]
     Write(#[from] std::io::Error),
 }
 
 /// Prints the parameters on standard output, and warnings on standard error.
 pub fn run(arguments: &Arguments) -> Result<(), ParametersError> {
-    let (names, start) = effective_parameters(&arguments.ros.read()?)?;
+    let (names, start) = effective_parameters(&arguments.ros.read()?).map_err(Box::new)?;
     for warning in &start.warnings {
         eprintln!("tanker_pose: warning: {warning}");
     }
