@@ -97,14 +97,29 @@ def test_the_command_line_wins_over_the_file(
     assert get(peer, "pixel_sigma_px").double_value == 0.75
 
 
-def test_an_unknown_parameter_in_a_file_stops_the_node_by_name(
+def test_an_unknown_parameter_under_the_nodes_own_name_stops_it_by_name(
     start_node: StartNode, tmp_path: Path
 ) -> None:
-    node = start_node("--params-file", str(params_file(tmp_path / "params.yaml", pixel_sigma=0.5)))
+    file = tmp_path / "params.yaml"
+    file.write_text("tanker_pose:\n  ros__parameters:\n    pixel_sigma: 0.5\n", encoding="utf-8")
+    node = start_node("--params-file", str(file))
 
     assert node.wait() != 0
-    assert "pixel_sigma" in node.log
+    assert f"{file}, line 3: unknown parameter \"pixel_sigma\"" in node.log
     assert "panicked" not in node.log
+
+
+def test_an_unknown_parameter_for_every_node_is_a_warning_with_the_likely_name(
+    start_estimator: StartEstimator, tmp_path: Path
+) -> None:
+    file = params_file(tmp_path / "params.yaml", pixel_sigma=0.5, robot_description="<robot/>")
+    estimator = start_estimator("--params-file", str(file))
+    estimator.use_camera()
+
+    estimator.expect_pose(messages.exact_frame(estimator.next_index()))
+    log = estimator.process.log
+    assert 'this node has no parameter "pixel_sigma", is pixel_sigma_px meant?' in log
+    assert 'this node has no parameter "robot_description"\n' in log
 
 
 def test_a_params_file_that_is_not_there_stops_the_node_by_name(start_node: StartNode) -> None:
