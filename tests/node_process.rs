@@ -77,7 +77,7 @@ fn unknown_parameter_in_a_file_is_named_with_file_and_line() {
     let path = std::env::temp_dir().join(format!("unknown_parameter_{}.yaml", std::process::id()));
     std::fs::write(
         &path,
-        "/**:\n  ros__parameters:\n    min_points: 4\n    max_outlier: 1\n",
+        "tanker_pose:\n  ros__parameters:\n    min_points: 4\n    max_outlier: 1\n",
     )
     .expect("the temporary directory is writable");
     let path_text = path.to_str().expect("the path is text");
