@@ -133,7 +133,12 @@ fn malformed_lines_are_answered_in_place_and_the_rest_is_solved() {
         ("this is not JSON".into(), "malformed", "line 2"),
         (String::new(), "malformed", "line 3"),
         ("[]".into(), "malformed", "line 4"),
-        (r#"{"id": 9}"#.into(), "malformed", "camera"),
+        (r#"{"id": 9}"#.into(), "malformed", "points"),
+        (
+            r#"{"id": 9, "points": []}"#.into(),
+            "malformed",
+            "expected a camera, or a file by --camera",
+        ),
         (
             changed(&|v| v["camera"]["k"] = json!([1.0, 2.0])),
             "malformed",
