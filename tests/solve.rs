@@ -135,11 +135,6 @@ fn malformed_lines_are_answered_in_place_and_the_rest_is_solved() {
         ("[]".into(), "malformed", "line 4"),
         (r#"{"id": 9}"#.into(), "malformed", "points"),
         (
-            r#"{"id": 9, "points": []}"#.into(),
-            "malformed",
-            "expected a camera, or a file by --camera",
-        ),
-        (
             changed(&|v| v["camera"]["k"] = json!([1.0, 2.0])),
             "malformed",
             "length 2",
@@ -222,6 +217,16 @@ fn malformed_lines_are_answered_in_place_and_the_rest_is_solved() {
         assert!(message.contains(words), "{line}\n{message}");
         assert_eq!(message.is_empty(), *outcome == "ok");
     }
+}
+
+#[test]
+fn a_line_without_a_camera_names_the_option_that_brings_one() {
+    let answers = solve(&[], vec![r#"{"id": 9, "points": []}"#.to_owned()]);
+    let message = answers[0]["message"].as_str().expect("text");
+    assert!(
+        message.ends_with("expected a camera, or a file by --camera"),
+        "{message}"
+    );
 }
 
 #[test]
