@@ -6,6 +6,7 @@ use ros2_client::dds::rustdds::policy::{Deadline, Durability, Reliability};
 use ros2_client::dds::rustdds::qos::QosPolicyId;
 use ros2_client::dds::rustdds::{DomainParticipant, QosPolicies};
 
+use super::messages::Message;
 use super::qos_overrides::Role;
 use crate::text::clip;
 
@@ -162,6 +163,12 @@ fn shown(qos: &QosPolicies, policy: QosPolicyId, default_reliability: &str) -> S
         },
         _ => "another".to_owned(),
     }
+}
+
+/// Returns the name of a message type on the wire, `package::msg::dds_::Name_`.
+#[must_use]
+pub fn type_on_the_wire<M: Message>() -> String {
+    format!("{}::msg::dds_::{}_", M::PACKAGE, M::NAME)
 }
 
 /// Returns `package/msg/Name` of the name on the wire, `package::msg::dds_::Name_`.

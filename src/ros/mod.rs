@@ -11,6 +11,7 @@
 //! service, reset, rtps               services, and what of the wire protocol is written here
 //! messages, convert, input           the wire <-> plain types
 //! newest                             what is left out when more samples wait than a topic's depth
+//! running_nodes                      nodes of this package in the domain, for tools that listen to them
 //! graph, health                      the other ends of the topics; faults around the node, said and shown
 //! consumers, attitude                what refuelling and flight stacks are told, by the receiver's attitude
 //! estimator, diagnostics             one message's work, and the node's health once a second
@@ -47,6 +48,7 @@ pub mod participant;
 pub mod qos_overrides;
 pub mod reset;
 pub mod rtps;
+pub mod running_nodes;
 mod scalar;
 mod serve;
 pub mod service;

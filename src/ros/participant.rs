@@ -26,11 +26,12 @@ pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
 
 use super::arguments::Arguments;
 use super::environment::Environment;
-use super::graph::{Graph, OwnEnd};
+use super::graph::{Graph, OwnEnd, type_on_the_wire};
 use super::leave::Farewell;
 use super::messages::Message;
 use super::names::{NamesError, NodeNames};
 use super::qos_overrides::{QosOverrides, Role};
+use super::running_nodes::Domain;
 
 /// How long the participants of a host get to find each other before the first endpoint is announced.
 ///
@@ -250,7 +251,7 @@ impl RosNode {
         self.own_ends.push(OwnEnd {
             topic,
             role,
-            type_name: format!("{}::msg::dds_::{}_", M::PACKAGE, M::NAME),
+            type_name: type_on_the_wire::<M>(),
             qos: (&qos).into(),
         });
         Ok(qos)
@@ -260,6 +261,12 @@ impl RosNode {
     #[must_use]
     pub fn graph(&self) -> Graph {
         Graph::of(&self.context.domain_participant(), &self.own_ends)
+    }
+
+    /// Returns what the domain holds beside this node.
+    #[must_use]
+    pub fn domain(&self) -> Domain {
+        Domain::of(&self.context.domain_participant())
     }
 
     /// Returns whether the middleware's threads still run. They end, for good, when the process is stopped and

@@ -8,6 +8,7 @@ mod ros_options;
 mod simulate;
 mod solve;
 mod terminal;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,7 @@ enum Tool {
     Demo(demo::Arguments),
     Simulate(simulate::Arguments),
     Parameters(parameters::Arguments),
+    Watch(watch::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
     /// Reproduce the paper's experiments: tables and plots
@@ -39,6 +41,7 @@ fn main() -> ExitCode {
         Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
         Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
         Tool::Parameters(arguments) => parameters::run(&arguments).map_err(Into::into),
+        Tool::Watch(arguments) => watch::run(&arguments).map_err(Into::into),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
         Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),
     };
