@@ -5,16 +5,22 @@
     python3 examples/closing_speed.py 10     # ten messages
 
 Needs rclpy and the messages of tanker_pose (a sourced workspace, or `.venv` of `tests/setup`); the node needs
-`-p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml`.
+`-p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml`: while nothing comes, what is missing is
+said on standard error.
 """
 
 import sys
+import time
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
+from rclpy.node import Node
 from tanker_pose.msg import ReceptacleState
 
+# So long without a message something is missing, s.
+PATIENCE_S = 5.0
+TOPIC = "receptacle"
 
 ENVELOPE = {
     ReceptacleState.ENVELOPE_OUTSIDE: "outside",
@@ -32,24 +38,45 @@ def line(message: ReceptacleState) -> str:
     )
 
 
+def missing(node: Node) -> str:
+    """Why nothing comes, as far as the graph shows it."""
+    if node.count_publishers(TOPIC):
+        why = "it has a publisher, so the node has no confirmed track: `tanker_pose watch` says why"
+    elif any(
+        "tanker_pose/msg/EstimatorStatus" in types for _, types in node.get_topic_names_and_types()
+    ):
+        why = (
+            "a tanker_pose node is there, but does not publish it. Start the node with -p publish_receptacle:=true "
+            "-p refuelling:=config/refuelling/example.yaml, or remap the topic"
+        )
+    else:
+        why = f"no tanker_pose node is in domain {node.context.get_domain_id()}"
+    return f"nothing on {node.resolve_topic_name(TOPIC)}: {why}"
+
+
 def main() -> None:
     own = remove_ros_args(sys.argv)[1:]
     left = int(own[0]) if own else None
     rclpy.init(args=sys.argv)
     node = rclpy.create_node("closing_speed")
+    said_or_heard = time.monotonic()
 
     def show(message: ReceptacleState) -> None:
-        nonlocal left
+        nonlocal left, said_or_heard
         if left == 0:
             return
         print(line(message), flush=True)
+        said_or_heard = time.monotonic()
         if left is not None:
             left -= 1
 
-    node.create_subscription(ReceptacleState, "receptacle", show, 10)
+    node.create_subscription(ReceptacleState, TOPIC, show, 10)
     try:
         while left != 0:
-            rclpy.spin_once(node)
+            rclpy.spin_once(node, timeout_sec=1.0)
+            if left != 0 and time.monotonic() - said_or_heard > PATIENCE_S:
+                print(missing(node), file=sys.stderr, flush=True)
+                said_or_heard = time.monotonic()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

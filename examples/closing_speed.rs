@@ -5,18 +5,26 @@
 //! cargo run --example closing_speed -- 10           # ten messages
 //! ```
 //!
-//! The node needs `-p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml`. ROS arguments
-//! (`--ros-args -r receptacle:=/uav1/receptacle`) and `ROS_DOMAIN_ID` count as for every node.
+//! The node needs `-p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml`: while nothing comes,
+//! what is missing is said on standard error. ROS arguments (`--ros-args -r receptacle:=/uav1/receptacle`) and
+//! `ROS_DOMAIN_ID` count as for every node.
 
 use std::error::Error;
-use std::io::Write;
+use std::io::{self, Write};
+use std::pin::pin;
+use std::time::{Duration, Instant};
 
-use futures::StreamExt;
+use async_signal::{Signal, Signals};
+use futures::{StreamExt, select};
 use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::consumers::RECEPTACLE;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::ReceptacleState;
-use tanker_pose::ros::participant::{NodeOptions, RosNode, reliable};
+use tanker_pose::ros::names::NamesError;
+use tanker_pose::ros::participant::{NodeOptions, RosNode, Subscription, reliable};
+
+/// So long without a message something is missing.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 fn line(message: &ReceptacleState) -> String {
     let envelope = match message.envelope {
@@ -33,6 +41,55 @@ fn line(message: &ReceptacleState) -> String {
     )
 }
 
+/// Returns why nothing comes, as far as the graph shows it.
+fn missing(node: &RosNode, domain_id: u16) -> Result<String, NamesError> {
+    let topic = node.names().topic(RECEPTACLE)?;
+    let why = if node.publisher_count(RECEPTACLE)? > 0 {
+        "it has a publisher, so the node has no confirmed track: `tanker_pose watch` says why"
+            .to_owned()
+    } else if node.domain().nodes.is_empty() {
+        format!("no tanker_pose node is in domain {domain_id}")
+    } else {
+        "a tanker_pose node is there, but does not publish it. Start the node with \
+         -p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml, or remap the topic"
+            .to_owned()
+    };
+    Ok(format!("nothing on {topic}: {why}"))
+}
+
+/// Prints until `limit` messages have come, or a signal.
+async fn print(
+    subscription: &Subscription<ReceptacleState>,
+    signals: &mut Signals,
+    limit: usize,
+    missing: impl Fn() -> Result<String, NamesError>,
+) -> Result<(), Box<dyn Error>> {
+    let mut out = io::stdout().lock();
+    let mut messages = pin!(subscription.async_stream());
+    let mut signals = signals.fuse();
+    let mut seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
+    let (mut count, mut said_or_heard) = (0, Instant::now());
+    while count < limit {
+        select! {
+            _ = signals.next() => break,
+            sample = messages.select_next_some() => {
+                match sample {
+                    Ok((message, _)) => writeln!(out, "{}", line(&message))?,
+                    Err(error) => writeln!(out, "not a ReceptacleState: {error}")?,
+                }
+                out.flush()?;
+                count += 1;
+                said_or_heard = Instant::now();
+            }
+            _ = seconds.select_next_some() => if said_or_heard.elapsed() > PATIENCE {
+                writeln!(io::stderr(), "{}", missing()?)?;
+                said_or_heard = Instant::now();
+            },
+        }
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let (arguments, own) = Arguments::split(&words)?;
@@ -41,6 +98,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => usize::MAX,
     };
     let environment = Environment::from_process()?;
+    let mut signals = Signals::new([Signal::Int, Signal::Term])?;
     let mut node = RosNode::open(
         "closing_speed",
         &arguments,
@@ -48,24 +106,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         NodeOptions::new().start_parameter_services(false),
     )?;
     let subscription = node.subscription::<ReceptacleState>(RECEPTACLE, &reliable(10))?;
-    let mut out = std::io::stdout().lock();
-    let printed = smol::block_on(async {
-        let messages = subscription.async_stream();
-        futures::pin_mut!(messages);
-        let mut count = 0;
-        while count < limit
-            && let Some(sample) = messages.next().await
-        {
-            match sample {
-                Ok((message, _)) => writeln!(out, "{}", line(&message))?,
-                Err(error) => writeln!(out, "not a ReceptacleState: {error}")?,
-            }
-            out.flush()?;
-            count += 1;
-        }
-        Ok::<(), std::io::Error>(())
-    });
+    let printed = smol::block_on(print(&subscription, &mut signals, limit, || {
+        missing(&node, environment.domain_id)
+    }));
     drop(subscription);
     node.close();
-    Ok(printed?)
+    printed
 }

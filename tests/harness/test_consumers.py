@@ -563,7 +563,8 @@ def test_the_examples_print_the_true_distance_and_closing_speed(
         }
         for name, process in running.items():
             assert process.wait() == 0, process.log
-            lines = process.log.splitlines()
+            # On a slow machine they may have said that nothing comes yet.
+            lines = [line for line in process.log.splitlines() if not line.startswith("nothing on")]
             assert len(lines) == 3, f"{name}: {process.log}"
             last = -1
             for line in lines:

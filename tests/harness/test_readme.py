@@ -1,15 +1,11 @@
-"""The documents' program does what it says: extracted, run, heard, and ended by Ctrl-C."""
+"""The documents name what there is: parameters, links, and the programs that they show."""
 
 import re
-import sys
 from pathlib import Path
 
-from harness import messages
-from harness.conftest import StartEstimator
-from harness.estimator import Estimator
-from harness.peer import RELIABLE
-from harness.processes import REPOSITORY, Process
-from harness.waiting import wait_until
+import pytest
+
+from harness.processes import REPOSITORY
 
 
 def test_the_documents_name_all_that_is_fixed_and_nothing_else() -> None:
@@ -44,26 +40,15 @@ def test_the_readme_stays_short() -> None:
     assert (REPOSITORY / "README.md").stat().st_size <= 11_000
 
 
-def test_the_python_subscriber_logs_the_pose_and_ends_quietly_on_ctrl_c(
-    start_estimator: StartEstimator, domain: int, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize(
+    ("language", "source"),
+    [("python", "pose_subscriber.py"), ("cpp", "cpp/pose_subscriber.cpp")],
+)
+def test_the_documents_show_the_examples_as_they_are(language: str, source: str) -> None:
     page = (REPOSITORY / "docs" / "subscribe.md").read_text(encoding="utf-8")
-    (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    script = tmp_path / "follower.py"
-    script.write_text(program, encoding="utf-8")
-    estimator: Estimator = start_estimator(qos=RELIABLE)
-    estimator.use_camera()
-
-    follower = Process([sys.executable, str(script)], domain, tmp_path / "follower", {})
-    try:
-        wait_until(
-            lambda: re.search(r"\d m ahead, sigma \d", follower.log),
-            "the subscriber to log a pose",
-            pause=lambda: estimator.expect_pose(messages.exact_frame(estimator.next_index())),
-        )
-        estimator.peer.spin_for(0.5)  # what is under way has arrived
-        follower.stop()
-    finally:
-        follower.kill_if_running()
-
-    assert "Traceback" not in follower.log, follower.log
+    (shown,) = re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
+    program = (REPOSITORY / "examples" / source).read_text(encoding="utf-8")
+    if language == "python":
+        # How it is run stands in the page's table.
+        program = re.sub(r'\A#!.*?\n"""\n\n', "", program, flags=re.DOTALL)
+    assert shown == program
