@@ -19,6 +19,7 @@ from harness.processes import REPOSITORY, child_environment
 from harness.rotations import Pose
 
 FRAMES = 150
+BAG_EXAMPLES = REPOSITORY / "examples" / "bags"
 TOPICS = {"/pose": PoseWithCovarianceStamped, "/status": EstimatorStatus}
 
 
@@ -64,8 +65,7 @@ def test_every_frame_of_a_played_approach_is_answered_with_an_honest_pose(
 def play(bag: Path, domain: int) -> subprocess.Popen[str]:
     """The player as its own process, as a person would start it."""
     return subprocess.Popen(
-        [sys.executable, "-m", "harness.play_bag", str(bag)],
-        cwd=REPOSITORY / "tests",
+        [sys.executable, str(BAG_EXAMPLES / "play_bag.py"), str(bag)],
         env=child_environment(domain),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -1,7 +1,10 @@
 """The examples do what they say: run as a user would, beside the real node, and ended by Ctrl-C."""
 
+import json
 import re
+import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +13,9 @@ import pytest
 from harness import messages
 from harness.conftest import StartEstimator, StartNode
 from harness.peer import RELIABLE, Peer
-from harness.processes import REPOSITORY, Process, example
+from harness.bags import read_bag
+from harness.messages import key
+from harness.processes import REPOSITORY, Process, binary, child_environment, example
 from harness.waiting import wait_until
 
 LANGUAGES = ["python", "rust"]
@@ -92,3 +97,78 @@ def test_without_receptacle_the_closing_speed_says_what_is_missing(
     )
     expect("it has a publisher, so the node has no confirmed track")
     closing.stop()
+
+
+def documented(program: str) -> str:
+    """The one command of docs/bags.md that runs this program."""
+    page = (REPOSITORY / "docs" / "bags.md").read_text(encoding="utf-8")
+    (line,) = re.findall(rf"(?m)^.*examples/bags/{program} .*$", page)
+    return line
+
+
+def runnable(command: str) -> str:
+    """The command with this environment's Python and the programs as they were built, for any directory."""
+    return (
+        command.replace("python3 ", f"{sys.executable} ")
+        .replace("examples/bags/", f"{REPOSITORY}/examples/bags/")
+        .replace("target/release/tanker_pose ", f"{binary('tanker_pose')} ")
+    )
+
+
+def test_the_road_by_bag_is_as_the_documents_say(
+    start_node: StartNode, peer: Peer, domain: int, tmp_path: Path
+) -> None:
+    def run(program: str) -> str:
+        command = runnable(documented(program))
+        done = subprocess.run(
+            ["bash", "-o", "pipefail", "-c", command],
+            cwd=tmp_path,
+            env=child_environment(domain),
+            capture_output=True,
+            text=True,
+            timeout=60.0,
+            check=False,
+        )
+        assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+        return done.stdout
+
+    assert run("write_bag.py") == "wrote 90 frames\n"
+    solved = [json.loads(line) for line in run("bag_to_solve.py").splitlines()]
+    assert len(solved) == 90
+    assert {frame["outcome"] for frame in solved} == {"ok"}
+    # The truth behind the pixels of the example, which are rounded to 0.1 px.
+    assert solved[0]["translation"] == pytest.approx([0.0, -4.5, 15.0], abs=0.01)
+
+    start_node()
+    peer.spin_until(lambda: peer.sees_node("/tanker_pose"), "the node to be in the graph")
+    words = runnable(documented("record_bag.py")).split()
+    words[2] = str(tmp_path / words[2])
+    recorder = Process(words, domain, tmp_path / "recorder", {})
+    try:
+        wait_until(
+            lambda: all(f"recording {topic}" in recorder.log for topic in ("/pose", "/status")),
+            "the recorder to find the topics",
+        )
+        assert "played 180 messages" in run("play_bag.py")
+        peer.spin_for(0.5)  # what is under way has arrived
+        recorder.stop()
+    finally:
+        recorder.kill_if_running()
+        print(recorder.log)
+
+    answers = read_bag(tmp_path / "answers")
+    assert [status.message for status in answers["/status"] if status.outcome] == []
+    assert len(answers["/status"]) == len(answers["/pose"]) == 90
+    by_stamp = {tuple(map(int, frame["id"].split("."))): frame for frame in solved}
+    for pose in answers["/pose"]:
+        found = pose.pose.pose.position
+        assert [found.x, found.y, found.z] == pytest.approx(
+            by_stamp[key(pose.header.stamp)]["translation"], abs=1e-9
+        )
+
+
+def test_the_page_about_bags_registers_the_types_as_the_example_does() -> None:
+    page = (REPOSITORY / "docs" / "bags.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    program = (REPOSITORY / "examples" / "bags" / "tanker_types.py").read_text(encoding="utf-8")
+    assert textwrap.indent(shown, "    ") in program
