@@ -89,6 +89,7 @@ fn estimates(criterion: &mut Criterion) {
         let estimator = Estimator::new(EstimatorSettings {
             initialisation,
             refinement,
+            max_outliers: 0,
             ..Default::default()
         });
         for count in [6, 100, 1000] {
@@ -110,6 +111,7 @@ fn exclusion(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("one_gross_error");
     for max_outliers in [1, 2] {
         let estimator = Estimator::new(EstimatorSettings {
+            min_points: 3,
             max_outliers,
             ..Default::default()
         });

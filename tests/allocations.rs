@@ -80,6 +80,8 @@ fn no_solve_of_64_points_or_fewer_allocates() {
                     let mut settings = EstimatorSettings {
                         initialisation,
                         refinement,
+                        // Two of six can be left out.
+                        min_points: 4,
                         ..EstimatorSettings::default()
                     };
                     let case = format!("{count} points, {initialisation:?}, {refinement:?}");

@@ -103,6 +103,7 @@ fn tally(count: usize, max_outliers: usize, seed: u64, fault: Fault) -> Tally {
     let estimator = Estimator::new(EstimatorSettings {
         max_outliers,
         min_points: 4,
+        max_ambiguity: 1.0,
         ..Default::default()
     });
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -175,6 +176,7 @@ fn exchanged_sides_of_the_tanker_are_never_trusted() {
             initialisation,
             max_outliers,
             min_points: 4,
+            max_ambiguity: 1.0,
             ..Default::default()
         });
         let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -269,6 +269,12 @@ mod tests {
     }
 
     #[test]
+    fn frames_are_judged_with_the_estimators_own_defaults() {
+        let default = configuration(&[]).settings.estimator;
+        assert_eq!(default, EstimatorSettings::default());
+    }
+
+    #[test]
     fn track_is_on_with_the_filters_own_defaults_and_can_be_switched_off() {
         let default = configuration(&[]).settings.track;
         assert_eq!(default, Some(FilterSettings::default()));

@@ -100,16 +100,17 @@ pub struct EstimatorSettings {
 }
 
 impl Default for EstimatorSettings {
-    /// Aligned airframes, a camera that looks straight ahead, maximum likelihood, no exclusion.
+    /// The node's: aligned airframes, a camera that looks straight ahead, maximum likelihood; of five points or
+    /// more one may be wrong, and no second pose may come near. A test holds the table of parameters to it.
     fn default() -> Self {
         Self {
             initialisation: Initialisation::Nominal,
             refinement: Refinement::MaximumLikelihood,
             nominal_camera_from_tanker: crate::geometry::optical_from_body(),
-            min_points: 3,
-            max_outliers: 0,
+            min_points: 5,
+            max_outliers: 1,
             trust_probability: 0.999,
-            max_ambiguity: 1.0,
+            max_ambiguity: 0.1,
         }
     }
 }

@@ -107,10 +107,16 @@ pub fn trial_generator(seed: u64, experiment: u16, setting: u16, trial: u32) -> 
 }
 
 impl Default for Solver {
-    /// Aligned airframes are the nominal attitude; no point is left out as wrong.
+    /// Aligned airframes are the nominal attitude. As in the paper, any three points will do, no point is left out
+    /// as wrong, and no pose is refused because of another one.
     fn default() -> Self {
         Self {
-            maximum_likelihood: Estimator::new(EstimatorSettings::default()),
+            maximum_likelihood: Estimator::new(EstimatorSettings {
+                min_points: 3,
+                max_outliers: 0,
+                max_ambiguity: 1.0,
+                ..EstimatorSettings::default()
+            }),
         }
     }
 }

@@ -32,7 +32,10 @@ SAME_TRANSLATION_M = 1e-5
 SAME_COVARIANCE = 1e-3
 
 # Every frame has its pose, however unlikely its noise, and no point is left out.
-ALL_POINTS = ("--max-outliers", "0", "--trust-probability", "0.999999")
+ALL_POINTS = (
+    *("--max-outliers", "0", "--trust-probability", "0.999999"),
+    *("--min-points", "3", "--max-ambiguity", "1"),
+)
 
 
 def distorted(model: str) -> Camera:

@@ -17,10 +17,14 @@ use tanker_pose::geometry::pose_error;
 use tanker_pose::simulation::{Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::{Marker, MarkerMap};
 
+/// Settings that only estimate: any three points will do, none is left out, and no rival pose refuses one.
 pub fn settings(initialisation: Initialisation, refinement: Refinement) -> EstimatorSettings {
     EstimatorSettings {
         initialisation,
         refinement,
+        min_points: 3,
+        max_outliers: 0,
+        max_ambiguity: 1.0,
         ..Default::default()
     }
 }

@@ -25,7 +25,7 @@ pub struct EstimatorOptions {
     #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 100.0))]
     pub pixel_sigma_px: f64,
     /// Fewer points than this give no pose
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(3..))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(3..))]
     min_points: u16,
     /// At most this many points of a frame may be left out as wrong
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
@@ -34,7 +34,7 @@ pub struct EstimatorOptions {
     #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = between(0.5, 0.999_999))]
     trust_probability: f64,
     /// Refuse a frame when a second pose is at least this likely; 1: never
-    #[arg(long, value_name = "RATIO", default_value_t = 1.0, value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "RATIO", default_value_t = 0.1, value_parser = between(0.0, 1.0))]
     max_ambiguity: f64,
     /// Roll of the tanker relative to the receiver in the nominal attitude, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
@@ -171,5 +171,27 @@ fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
         Err(format!(
             "expected a number from {min} to {max}, got {value}"
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use tanker_pose::config::{Configuration, Parameters};
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        estimator: EstimatorOptions,
+    }
+
+    #[test]
+    fn options_default_to_what_the_node_does() {
+        let line = Line::parse_from(["tool"]);
+        let node = Configuration::from(&Parameters::default()).settings;
+        assert_eq!(line.estimator.settings(), node.estimator);
+        let sigma_px = line.estimator.pixel_sigma_px;
+        assert!((sigma_px - node.pixel_sigma_px).abs() < f64::EPSILON);
     }
 }
