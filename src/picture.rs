@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::estimation::{Excluded, Initialisation, Solution};
     use crate::geometry::PoseCovariance;
-    use crate::pipeline::{FrameTrack, Refusal};
+    use crate::pipeline::{FrameTrack, LeftOut, Refusal};
     use nalgebra::{Matrix6, Translation3};
 
     /// Rounding of a few products, m.
@@ -206,6 +206,7 @@ mod tests {
             doubtful: None,
             used_ids: vec![1, 2],
             rejected_ids: vec![6],
+            left_out: LeftOut::default(),
             initialisation: None,
             track: FrameTrack::default(),
         };

@@ -81,8 +81,18 @@ fn a_hundred_thousand_frames_through_one_process_are_consistent() {
             frame(id, &scene.noisy_observations(0.5, &mut random)).to_string()
         })
         .collect();
-    // Without exclusion and with rivals allowed, so that the share of trusted frames is that of the chi-squared test.
-    let answers = solve(&["--max-outliers", "0", "--max-ambiguity", "1"], lines);
+    // Without exclusion, at the edge either, and with rivals allowed, so that the share of trusted frames is that of the chi-squared test.
+    let answers = solve(
+        &[
+            "--max-outliers",
+            "0",
+            "--max-ambiguity",
+            "1",
+            "--edge-margin-px",
+            "0",
+        ],
+        lines,
+    );
     assert_eq!(answers.len(), FRAMES);
     let (mut trusted, mut nees_sum) = (0, 0.0);
     for (id, (answer, truth)) in answers.iter().zip(&truths).enumerate() {

@@ -54,6 +54,7 @@ impl From<&Parameters> for Configuration {
             settings: Settings {
                 estimator: estimator_settings(parameters),
                 pixel_sigma_px: parameters.double("pixel_sigma_px"),
+                edge_margin_px: parameters.double("edge_margin_px"),
                 rectified: parameters.bool("rectified"),
                 track: parameters
                     .bool("track")
@@ -224,6 +225,7 @@ mod tests {
             ("input", String("apriltags".into())),
             ("max_hamming", Integer(2)),
             ("pixel_sigma_px", Double(0.25)),
+            ("edge_margin_px", Double(7.0)),
             ("rectified", Bool(true)),
             ("initialisation", String("global".into())),
             ("refinement", String("none".into())),
@@ -249,6 +251,7 @@ mod tests {
         assert!(found.use_sim_time && found.lifecycle);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
+        assert!((found.settings.edge_margin_px - 7.0).abs() < f64::EPSILON);
         assert_eq!(estimator.initialisation, Initialisation::Global);
         assert_eq!(estimator.refinement, Refinement::None);
         assert_eq!((estimator.max_outliers, estimator.min_points), (1, 5));

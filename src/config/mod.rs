@@ -28,6 +28,8 @@ pub struct Settings {
     pub estimator: EstimatorSettings,
     /// Standard deviation for detections that bring none, px.
     pub pixel_sigma_px: f64,
+    /// Detections nearer than this to the edge of the image are left out, px; 0: none.
+    pub edge_margin_px: f64,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
     /// Track settings; `None` disables tracking. Settings out of the filter's ranges disable it too: the table allows none.

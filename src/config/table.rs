@@ -183,6 +183,17 @@ pub const TABLE: &[ParameterSpec] = &[
         description: "px, standard deviation of a detection's column and row where it brings no sigma of its own",
     },
     ParameterSpec {
+        name: "edge_margin_px",
+        kind: Kind::Double {
+            default: 3.0,
+            min: 0.0,
+            max: 1000.0,
+        },
+        read_only: false,
+        description: "px, detections nearer than this to the edge of the image are left out, since the edge may cut their beacons \
+                      and move their centroids; the radius of the largest beacon in the image; 0: none is left out",
+    },
+    ParameterSpec {
         name: "rectified",
         kind: Kind::Bool { default: false },
         read_only: false,

@@ -1,7 +1,7 @@
 //! One frame's straight line: detections in, one outcome out, the same for node, tools and tests.
 //!
 //! ```text
-//! stamp -> camera -> frame_id -> every detection -> observations -> estimate -> trusted? -> track -> outcome
+//! stamp -> camera -> frame_id -> every detection -> clear of the edge -> observations -> estimate -> trusted? -> track -> outcome
 //! ```
 //!
 //! Knows `estimation`, `tracking`, `camera`, `target`; time enters only as the stamp of a frame. Never reads a
@@ -10,6 +10,7 @@
 
 mod checks;
 mod code;
+mod edge;
 mod outcome;
 mod track;
 
@@ -24,6 +25,7 @@ use crate::target::MarkerMap;
 
 pub use checks::observe;
 pub use code::OutcomeCode;
+pub use edge::{ImageEdges, LeftOut};
 pub use outcome::{FrameOutcome, Refusal};
 use track::Tracker;
 pub use track::{FrameTrack, TrackCode};
@@ -85,6 +87,23 @@ struct LatchedCamera {
     info: CameraInfo,
     frame_id: String,
     camera: Result<Camera, CameraError>,
+    edges: Option<ImageEdges>,
+}
+
+impl LatchedCamera {
+    fn new(info: CameraInfo, frame_id: String, rectified: bool) -> Self {
+        let camera = Camera::from_info(&info, rectified);
+        let edges = camera
+            .as_ref()
+            .ok()
+            .map(|camera| ImageEdges::new(&info, camera, rectified));
+        Self {
+            info,
+            frame_id,
+            camera,
+            edges,
+        }
+    }
 }
 
 /// The estimator with what it remembers between frames: the camera, the last trusted attitude, the track.
@@ -121,9 +140,9 @@ impl Pipeline {
         if settings.rectified != self.settings.rectified {
             // The rectified camera looks elsewhere.
             self.reset();
-            if let Some(latched) = &mut self.camera {
-                latched.camera = Camera::from_info(&latched.info, settings.rectified);
-            }
+            self.camera = self.camera.take().map(|latched| {
+                LatchedCamera::new(latched.info, latched.frame_id, settings.rectified)
+            });
         }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
@@ -155,13 +174,10 @@ impl Pipeline {
             // What was seen from there says nothing about here.
             self.reset();
         }
-        let camera = Camera::from_info(info, self.settings.rectified);
-        let result = camera.as_ref().map(|_| true).map_err(Clone::clone);
-        self.camera = Some(LatchedCamera {
-            info: info.clone(),
-            frame_id: frame_id.to_owned(),
-            camera,
-        });
+        let latched =
+            LatchedCamera::new(info.clone(), frame_id.to_owned(), self.settings.rectified);
+        let result = latched.camera.as_ref().map(|_| true).map_err(Clone::clone);
+        self.camera = Some(latched);
         result
     }
 
@@ -175,9 +191,9 @@ impl Pipeline {
     /// Returns the outcome of one frame.
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
         let mut outcome = match self.observations(frame) {
-            Ok((camera, observations)) => {
+            Ok((camera, observations, left_out)) => {
                 let previous = self.expected_rotation(frame.stamp);
-                solve(&self.estimator, camera, &observations, previous.as_ref())
+                solve(&self.estimator, camera, &observations, previous.as_ref()).without(left_out)
             }
             Err(refusal) => FrameOutcome::refused(refusal),
         };
@@ -226,7 +242,11 @@ impl Pipeline {
         Ok(camera)
     }
 
-    fn observations(&self, frame: &DetectionFrame) -> Result<(&Camera, Vec<Observation>), Refusal> {
+    /// Returns the checked observations of a frame, with its camera and what was left out of it.
+    fn observations(
+        &self,
+        frame: &DetectionFrame,
+    ) -> Result<(&Camera, Vec<Observation>, LeftOut), Refusal> {
         let camera = self.camera_for(frame.stamp, &frame.frame_id)?;
         let observations = observe(
             camera,
@@ -234,7 +254,15 @@ impl Pipeline {
             self.settings.pixel_sigma_px,
             |id| self.map.get(id),
         )?;
-        Ok((camera, observations))
+        let edges = self
+            .camera
+            .as_ref()
+            .and_then(|latched| latched.edges.as_ref());
+        let (observations, left_out) = match edges {
+            Some(edges) => edges.leave_out(observations, self.settings.edge_margin_px),
+            None => (observations, LeftOut::default()),
+        };
+        Ok((camera, observations, left_out))
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::camera::CameraError;
 use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
 
-use super::{FrameTrack, Stamp};
+use super::{FrameTrack, LeftOut, Stamp};
 use crate::text::{clip, digits, list};
 
 /// Why a frame gives no pose. Each says what was expected and what came.
@@ -220,8 +220,10 @@ pub struct FrameOutcome {
     pub doubtful: Option<Solution>,
     /// Marker ids that the solution rests on.
     pub used_ids: Vec<u32>,
-    /// Marker ids left out as wrong.
+    /// Marker ids left out, as wrong or at the edge of the image.
     pub rejected_ids: Vec<u32>,
+    /// Those at the edge of the image, of which the solver knew nothing.
+    pub left_out: LeftOut,
     /// Where the iteration started; none when no solve was attempted.
     pub initialisation: Option<Initialisation>,
     /// What the frame did to the track, if there is one.
@@ -237,6 +239,7 @@ impl FrameOutcome {
             doubtful: None,
             used_ids: Vec::new(),
             rejected_ids: Vec::new(),
+            left_out: LeftOut::default(),
             initialisation: None,
             track: FrameTrack::default(),
         }
@@ -261,9 +264,28 @@ impl FrameOutcome {
             doubtful,
             used_ids,
             rejected_ids,
+            left_out: LeftOut::default(),
             initialisation,
             track: FrameTrack::default(),
         }
+    }
+
+    /// Returns the outcome with the detections that were left out before it.
+    #[must_use]
+    pub fn without(mut self, left_out: LeftOut) -> Self {
+        self.rejected_ids.extend(&left_out.ids);
+        self.left_out = left_out;
+        self
+    }
+
+    /// Returns what there is to say of the frame: the refusal, and what was left out at the edge of the image; often
+    /// nothing.
+    #[must_use]
+    pub fn message(&self) -> String {
+        let refusal = self.result.as_ref().err().map(ToString::to_string);
+        let left_out = (!self.left_out.ids.is_empty()).then(|| self.left_out.to_string());
+        let parts: Vec<String> = refusal.into_iter().chain(left_out).collect();
+        parts.join("; ")
     }
 
     /// Returns the numbers of the best fit, trusted or not.

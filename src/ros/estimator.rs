@@ -200,6 +200,8 @@ impl Estimator {
         if let Ok(solution) = &outcome.result {
             let excluded = &solution.excluded;
             let ids = frame.detections.iter().map(|seen| seen.id);
+            // A marker at the edge of the image was not judged.
+            let ids = ids.filter(|id| !outcome.left_out.ids.contains(id));
             let markers = ids.map(|id| (id, excluded.contains(id)));
             self.watch.on_pose(markers, begin);
             self.outputs
@@ -436,7 +438,7 @@ impl Estimator {
         if let Ok(solution) = &answer.result {
             if !std::mem::replace(&mut self.has_estimated, true) {
                 let distance_m = solution.camera_from_tanker.translation.vector.norm();
-                let used = frame.detections.len() - solution.excluded.ids().count();
+                let used = answer.used_ids.len();
                 log::info!(
                     "first pose: the tanker is {distance_m:.1} m away, found by {used} markers"
                 );

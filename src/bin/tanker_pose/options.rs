@@ -24,6 +24,9 @@ pub struct EstimatorOptions {
     /// Standard deviation of pixels that bring none, px
     #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 100.0))]
     pub pixel_sigma_px: f64,
+    /// Points nearer than this to the edge of the image are left out, px; 0: none
+    #[arg(long, value_name = "PX", default_value_t = 3.0, value_parser = between(0.0, 1000.0))]
+    pub edge_margin_px: f64,
     /// Fewer points than this give no pose
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(3..))]
     min_points: u16,
@@ -193,5 +196,7 @@ mod tests {
         assert_eq!(line.estimator.settings(), node.estimator);
         let sigma_px = line.estimator.pixel_sigma_px;
         assert!((sigma_px - node.pixel_sigma_px).abs() < f64::EPSILON);
+        let margin_px = line.estimator.edge_margin_px;
+        assert!((margin_px - node.edge_margin_px).abs() < f64::EPSILON);
     }
 }

@@ -186,12 +186,7 @@ pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> Est
     EstimatorStatus {
         header,
         outcome: frame.code().number(),
-        message: frame
-            .result
-            .as_ref()
-            .err()
-            .map(ToString::to_string)
-            .unwrap_or_default(),
+        message: frame.message(),
         used_ids: frame.used_ids.clone(),
         rejected_ids: frame.rejected_ids.clone(),
         rms_residual: number(|solution| solution.rms_px),

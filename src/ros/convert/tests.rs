@@ -3,7 +3,7 @@ use nalgebra::{Isometry3, Matrix6, Quaternion, Translation3, UnitQuaternion};
 use super::*;
 use crate::estimation::Excluded;
 use crate::geometry::PoseCovariance;
-use crate::pipeline::{FrameTrack, OutcomeCode, Refusal};
+use crate::pipeline::{FrameTrack, LeftOut, OutcomeCode, Refusal};
 
 fn header() -> Header {
     // Neither a valid time nor a likely frame: nothing may depend on that.
@@ -38,6 +38,7 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
         doubtful,
         used_ids: vec![1, 2],
         rejected_ids: vec![3],
+        left_out: LeftOut::default(),
         initialisation: Some(Initialisation::Dlt),
         track: FrameTrack::default(),
     }

@@ -164,12 +164,7 @@ impl OutputFrame {
         Self {
             id,
             outcome: outcome.code().name().to_ascii_lowercase(),
-            message: outcome
-                .result
-                .as_ref()
-                .err()
-                .map(ToString::to_string)
-                .unwrap_or_default(),
+            message: outcome.message(),
             pose: outcome.result.as_ref().ok().map(OutputPose::new),
             numbers: outcome.solution().map(OutputNumbers::new),
             used_ids: outcome.used_ids,

@@ -14,7 +14,7 @@ use indicatif::ProgressBar;
 use nalgebra::{Point3, Rotation3};
 use tanker_pose::camera::{Camera, CameraError, CameraInfo};
 use tanker_pose::estimation::Estimator;
-use tanker_pose::pipeline::{self, Detection, FrameOutcome, Refusal, observe};
+use tanker_pose::pipeline::{self, Detection, FrameOutcome, ImageEdges, Refusal, observe};
 use tanker_pose::target::MarkerMap;
 
 use self::lines::{InputFrame, InputPoint, OutputFrame, reason};
@@ -124,13 +124,17 @@ fn read_line(input: &mut impl BufRead, line: &mut Vec<u8>, number: u64) -> Resul
     }
 }
 
+/// A camera, and where its image ends.
+type Sight = (Camera, ImageEdges);
+
 struct Solver {
     estimator: Estimator,
     map: Option<MarkerMap>,
     calibration: Option<CameraInfo>,
     rectified: bool,
     pixel_sigma_px: f64,
-    camera: Option<(CameraInfo, Result<Camera, CameraError>)>,
+    edge_margin_px: f64,
+    camera: Option<(CameraInfo, Result<Sight, CameraError>)>,
     previous_rotation: Option<Rotation3<f64>>,
 }
 
@@ -151,6 +155,7 @@ impl Solver {
                 .transpose()?,
             rectified: arguments.rectified,
             pixel_sigma_px: arguments.estimator.pixel_sigma_px,
+            edge_margin_px: arguments.estimator.edge_margin_px,
             camera: None,
             previous_rotation: None,
         })
@@ -221,9 +226,9 @@ impl Solver {
             .map(|point| self.marker(point).map(|marker| (point.id, marker)))
             .collect::<Result<Vec<_>, String>>()?;
         let detections: Vec<Detection> = frame.points.iter().map(InputPoint::detection).collect();
-        let sigma_px = self.pixel_sigma_px;
-        let camera = match self.latch(info) {
-            Ok(camera) => camera,
+        let (sigma_px, margin_px) = (self.pixel_sigma_px, self.edge_margin_px);
+        let (camera, edges) = match self.latch(info) {
+            Ok(sight) => sight,
             Err(error) => {
                 return Ok(FrameOutcome::refused(Refusal::InvalidCameraInfo(
                     error.clone(),
@@ -240,13 +245,15 @@ impl Solver {
             Ok(observations) => observations,
             Err(refusal) => return Ok(FrameOutcome::refused(refusal)),
         };
+        let (observations, left_out) = edges.leave_out(observations, margin_px);
         let camera = camera.clone();
         let outcome = pipeline::solve(
             &self.estimator,
             &camera,
             &observations,
             self.previous_rotation.as_ref(),
-        );
+        )
+        .without(left_out);
         if let Ok(solution) = &outcome.result {
             self.previous_rotation =
                 Some(solution.camera_from_tanker.rotation.to_rotation_matrix());
@@ -255,14 +262,17 @@ impl Solver {
     }
 
     /// Checks a camera once and keeps it while the lines bring the same.
-    fn latch(&mut self, info: CameraInfo) -> Result<&Camera, &CameraError> {
+    fn latch(&mut self, info: CameraInfo) -> Result<&Sight, &CameraError> {
         let rectified = self.rectified;
         let known = self.camera.take().filter(|(known, _)| *known == info);
-        let (_, camera) = self.camera.insert(known.unwrap_or_else(|| {
-            let camera = Camera::from_info(&info, rectified);
-            (info, camera)
+        let (_, sight) = self.camera.insert(known.unwrap_or_else(|| {
+            let sight = Camera::from_info(&info, rectified).map(|camera| {
+                let edges = ImageEdges::new(&info, &camera, rectified);
+                (camera, edges)
+            });
+            (info, sight)
         }));
-        camera.as_ref()
+        sight.as_ref()
     }
 
     /// Where a point sits on the tanker: as it says itself, or as the map says; none when neither does.
