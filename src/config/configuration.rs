@@ -28,6 +28,8 @@ pub struct Configuration {
     pub lifecycle: bool,
     /// Whether to publish what `RViz` and Foxglove can draw.
     pub publish_markers: bool,
+    /// Whether to tell detectors where markers will be.
+    pub publish_predicted_points: bool,
     /// Where detections come from.
     pub input: Input,
     /// Most corrected bits of a tag.
@@ -66,6 +68,7 @@ impl From<&Parameters> for Configuration {
             use_sim_time: parameters.bool("use_sim_time"),
             lifecycle: parameters.bool("lifecycle"),
             publish_markers: parameters.bool("publish_markers"),
+            publish_predicted_points: parameters.bool("publish_predicted_points"),
             input: match parameters.text("input") {
                 "detections" => Input::Detections,
                 "apriltags" => Input::AprilTags,
@@ -222,6 +225,7 @@ mod tests {
             ("use_sim_time", Bool(true)),
             ("lifecycle", Bool(true)),
             ("publish_markers", Bool(true)),
+            ("publish_predicted_points", Bool(true)),
             ("input", String("apriltags".into())),
             ("max_hamming", Integer(2)),
             ("pixel_sigma_px", Double(0.25)),
@@ -248,7 +252,7 @@ mod tests {
             ("fin6", "kc46")
         );
         assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
-        assert!(found.use_sim_time && found.lifecycle);
+        assert!(found.use_sim_time && found.lifecycle && found.publish_predicted_points);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
         assert!((found.settings.edge_margin_px - 7.0).abs() < f64::EPSILON);

@@ -152,6 +152,10 @@ pub const TABLE: &[ParameterSpec] = &[
         read_only: true,
         description: "also publish markers, which RViz and Foxglove draw",
     },
+    output(
+        "publish_predicted_points",
+        "also publish predicted_points: where the markers will be in the next image, with sigmas, for detectors",
+    ),
     ParameterSpec {
         name: "input",
         kind: Kind::Choice {

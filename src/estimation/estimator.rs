@@ -26,7 +26,7 @@ const BOLD_SIGMA_RATIO: f64 = 2.0;
 /// Points from which on `min_points` asks for checks: with four, errors mostly pass unseen whatever they claim.
 const CHECKED_FROM: usize = 5;
 /// rad; spread of the attitude about its prior: refuelling keeps the relative angles within ±5°.
-const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
+pub(crate) const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// Settings with what can be computed once: the limits of the chi-squared test.
 #[derive(Debug, Clone, PartialEq)]

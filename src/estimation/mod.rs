@@ -41,6 +41,7 @@ use crate::camera::{Camera, Pixel, Ray, UndistortError};
 use crate::geometry::PoseCovariance;
 
 pub use estimator::Estimator;
+pub(crate) use estimator::PRIOR_SIGMA;
 pub use initialise::linear_rotation;
 pub use orthogonal_iteration::{Iterated, fixed_point, iterate_accelerated, iterate_literally};
 

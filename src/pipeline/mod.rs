@@ -11,7 +11,10 @@
 mod checks;
 mod code;
 mod edge;
+mod next_image;
 mod outcome;
+mod predict;
+mod stamp;
 mod track;
 
 use std::sync::Arc;
@@ -26,36 +29,13 @@ use crate::target::MarkerMap;
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use edge::{ImageEdges, LeftOut};
+pub use next_image::NextImage;
 pub use outcome::{FrameOutcome, Refusal};
+pub use predict::PredictedPoint;
+use predict::Predictor;
+pub use stamp::Stamp;
 use track::Tracker;
 pub use track::{FrameTrack, TrackCode};
-
-/// The time at which an image was taken, as ROS carries it: never converted, so never rounded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Hash)]
-pub struct Stamp {
-    /// Whole seconds.
-    pub sec: i32,
-    /// Nanoseconds on top, below 1e9.
-    pub nanosec: u32,
-}
-
-/// s; a pose older than this says little about the next one.
-const MAX_PREVIOUS_AGE_S: f64 = 2.0;
-
-impl Stamp {
-    /// Returns the whole time in nanoseconds, of which 64 bits hold every stamp there can be.
-    #[must_use]
-    pub const fn nanoseconds(self) -> i64 {
-        self.sec as i64 * 1_000_000_000 + self.nanosec as i64
-    }
-
-    /// Returns whether this is at or after `earlier`, by [`MAX_PREVIOUS_AGE_S`] at the most.
-    fn follows_closely(self, earlier: Self) -> bool {
-        let seconds = f64::from(self.sec) - f64::from(earlier.sec);
-        let nanoseconds = f64::from(self.nanosec) - f64::from(earlier.nanosec);
-        (0.0..=MAX_PREVIOUS_AGE_S).contains(&(seconds + nanoseconds * 1e-9))
-    }
-}
 
 /// One beacon found in an image, before any check.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +86,8 @@ impl LatchedCamera {
     }
 }
 
-/// The estimator with what it remembers between frames: the camera, the last trusted attitude, the track.
+/// The estimator with what it remembers between frames: the camera, the last trusted attitude, the track and its last
+/// motion.
 #[derive(Debug)]
 pub struct Pipeline {
     settings: Settings,
@@ -116,6 +97,7 @@ pub struct Pipeline {
     /// Rotation of the last trusted pose, with its time.
     previous: Option<(Rotation3<f64>, Stamp)>,
     tracker: Tracker,
+    predictor: Predictor,
 }
 
 impl Pipeline {
@@ -125,6 +107,7 @@ impl Pipeline {
         Self {
             estimator: Estimator::new(settings.estimator.clone()),
             tracker: Tracker::new(settings.track),
+            predictor: Predictor::default(),
             settings,
             map,
             camera: None,
@@ -152,6 +135,7 @@ impl Pipeline {
     pub fn reset(&mut self) {
         self.previous = None;
         self.tracker.reset();
+        self.predictor.forget();
     }
 
     /// Latches a camera info; returns whether it differs from the one before.
@@ -198,6 +182,7 @@ impl Pipeline {
             Err(refusal) => FrameOutcome::refused(refusal),
         };
         self.tracker.follow(frame.stamp, &mut outcome);
+        self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {
             let rotation = solution.camera_from_tanker.rotation.to_rotation_matrix();
             self.previous = Some((rotation, frame.stamp));

@@ -7,7 +7,7 @@ use nalgebra::Rotation3;
 
 use super::{FrameOutcome, OutcomeCode, Stamp};
 use crate::geometry::Motion;
-use crate::tracking::{Filter, FilterSettings, TrackOutcome};
+use crate::tracking::{Filter, FilterSettings, LastMotion, TrackOutcome};
 
 /// What one frame did to the track.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -116,6 +116,11 @@ impl Tracker {
     pub(super) fn expected_rotation(&self, stamp: Stamp) -> Option<Rotation3<f64>> {
         let motion = self.0.as_ref()?.predict(stamp.nanoseconds()).ok()?;
         Some(motion.b_from_a.rotation.to_rotation_matrix())
+    }
+
+    /// Returns the last motion of track or candidate; none without either.
+    pub(super) fn last_motion(&self) -> Option<LastMotion> {
+        self.0.as_ref()?.last_motion()
     }
 
     /// Tells the filter of a frame, and enters what came of it in the outcome.

@@ -18,6 +18,7 @@ use super::messages::{
 };
 use super::node::{ATTITUDE, CAMERA_INFO};
 use super::once::SaidOnce;
+use super::predicted_points::PredictedPoints;
 use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
@@ -66,6 +67,8 @@ pub struct Outputs {
     pub transform: Option<Output<TFMessage>>,
     /// What can be drawn of a frame, if wanted.
     pub markers: Option<Output<MarkerArray>>,
+    /// Where markers will be, for detectors, if wanted.
+    pub predicted_points: Option<PredictedPoints>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
     /// What refuelling and flight stacks are told, if wanted.
@@ -174,6 +177,9 @@ impl Estimator {
             // Two drivers on one topic change it with every message.
             log::info!("camera info has changed: {}", self.camera);
         }
+        if let (Some(predicted), true) = (&mut self.outputs.predicted_points, self.active) {
+            predicted.on_camera_info(&message.header, &self.pipeline, &mut self.tally);
+        }
     }
 
     /// Takes the detections of an image; publishes what becomes of them.
@@ -219,6 +225,9 @@ impl Estimator {
         status.rejected_ids.extend(sighting.ignored_ids);
         self.take_note(&outcome, &status.message, &frame, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
+        if let Some(predicted) = &mut self.outputs.predicted_points {
+            predicted.on_detections(&header, &self.pipeline, &mut self.tally);
+        }
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
         let end = Instant::now();

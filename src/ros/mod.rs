@@ -14,6 +14,7 @@
 //! running_nodes                      nodes of this package in the domain, for tools that listen to them
 //! graph, health                      the other ends of the topics; faults around the node, said and shown
 //! consumers, attitude                what refuelling and flight stacks are told, by the receiver's attitude
+//! predicted_points                   where detectors may look in the next image
 //! estimator, diagnostics             one message's work, and the node's health once a second
 //! logging, once                      what is said about it, and how often
 //! node, serve                        all of it together, until a signal or a tool ends it
@@ -45,6 +46,7 @@ pub mod overrides;
 pub mod parameter_file;
 pub mod parameters;
 pub mod participant;
+pub mod predicted_points;
 pub mod qos_overrides;
 pub mod reset;
 pub mod rtps;

@@ -24,6 +24,7 @@ use super::parameters::{ParameterServices, SharedParameters};
 use super::participant::{
     EndpointError, OpenError, QosProfile, RosNode, Subscription, reliable, sensor_data,
 };
+use super::predicted_points::PredictedPoints;
 use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
 use super::serve::Server;
@@ -46,6 +47,8 @@ pub const POSE: &str = "pose";
 pub const ODOMETRY: &str = "odometry";
 /// Output: what became of every image.
 pub const STATUS: &str = "status";
+/// Output: where markers will be, for detectors.
+pub const PREDICTED_POINTS: &str = "predicted_points";
 /// Output: what can be drawn of it.
 pub const MARKERS: &str = "markers";
 
@@ -205,6 +208,7 @@ fn endpoints(names: &NodeNames) -> Result<Vec<Endpoint>, NamesError> {
         (ODOMETRY, Role::Publisher, &OUTPUT),
         (STATUS, Role::Publisher, &OUTPUT),
         (MARKERS, Role::Publisher, &OUTPUT),
+        (PREDICTED_POINTS, Role::Publisher, &OUTPUT),
         ("/tf", Role::Publisher, &TRANSFORMS),
         ("/diagnostics", Role::Publisher, &DIAGNOSTICS),
         (
@@ -242,6 +246,7 @@ fn opened(names: &NodeNames, configuration: &Configuration) -> Result<Vec<String
     let optional = [
         (configuration.publish_tf, "/tf"),
         (configuration.publish_markers, MARKERS),
+        (configuration.publish_predicted_points, PREDICTED_POINTS),
         (consumers.receptacle, consumers::RECEPTACLE),
         (consumers.px4_landing_target, consumers::PX4_LANDING_TARGET),
         (
@@ -303,6 +308,7 @@ pub(super) fn introduce(
     let optional = [
         (configuration.publish_tf, "/tf"),
         (configuration.publish_markers, MARKERS),
+        (configuration.publish_predicted_points, PREDICTED_POINTS),
     ];
     let published: Vec<String> = [POSE, ODOMETRY, STATUS, "/diagnostics"]
         .into_iter()
@@ -350,6 +356,15 @@ pub(super) fn open_topics(
     } else {
         None
     };
+    let predicted_points = if configuration.publish_predicted_points {
+        Some(PredictedPoints::new(output(
+            ros,
+            PREDICTED_POINTS,
+            &OUTPUT,
+        )?))
+    } else {
+        None
+    };
     let outputs = Outputs {
         pose: output(ros, POSE, &OUTPUT)?,
         odometry: output(ros, ODOMETRY, &OUTPUT)?,
@@ -357,6 +372,7 @@ pub(super) fn open_topics(
         status: output(ros, STATUS, &OUTPUT)?,
         transform,
         markers,
+        predicted_points,
         diagnostics: output(ros, "/diagnostics", &DIAGNOSTICS)?,
         consumers: Consumers::open(ros, &configuration.consumers, setup)?,
     };

@@ -329,6 +329,16 @@ impl Filter {
         outcome
     }
 
+    /// Returns track or candidate, the noise that drives it, and whether it is confirmed.
+    pub(super) fn believed(&self) -> Option<(Track, Noise, bool)> {
+        let state = self.state.as_ref()?;
+        Some((
+            state.track,
+            *self.noise(&state.lag),
+            self.is_confirmed(state),
+        ))
+    }
+
     fn confirmed(&self) -> Option<&State> {
         self.state.as_ref().filter(|state| self.is_confirmed(state))
     }
@@ -400,7 +410,7 @@ fn check(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Result<(), Measu
 }
 
 /// Returns `later − earlier`; whole nanoseconds, so that no clock's epoch costs precision.
-fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
+pub(super) fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
     // In 128 bits the difference of any two stamps exists.
     let nanoseconds = i128::from(later_ns) - i128::from(earlier_ns);
     // Divided, not multiplied: ten seconds are then exactly ten.

@@ -282,6 +282,11 @@ pub fn jerk(seed: u64, acceleration_mps2: f64, quiet_s: f64, duration_s: f64) ->
     })
 }
 
+/// Images of a tanker that stands still.
+pub fn station(seed: u64, at: Isometry3<f64>, duration_s: f64) -> Vec<Frame> {
+    sampled(seed, duration_s, |_| at)
+}
+
 /// Images of a motion, its velocity by differences.
 fn sampled(seed: u64, duration_s: f64, pose: impl Fn(f64) -> Isometry3<f64>) -> Vec<Frame> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);

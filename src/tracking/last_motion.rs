@@ -1,0 +1,49 @@
+//! The last motion that a filter believed, which outlives its track: good enough to say where to look.
+
+use super::filter::seconds;
+use super::model::{Noise, predict};
+use super::{Filter, Track};
+use crate::geometry::Motion;
+
+/// A motion with what makes it unknown over time. It says nothing about whether anybody should fly by it: a track
+/// ends [`max_gap_s`](super::FilterSettings::max_gap_s) after its last frame, and this goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LastMotion {
+    pub(super) track: Track,
+    pub(super) noise: Noise,
+    pub(super) is_confirmed: bool,
+}
+
+impl LastMotion {
+    /// Returns the motion at the last accepted frame.
+    #[must_use]
+    pub fn motion(&self) -> &Motion {
+        &self.track.motion
+    }
+
+    /// Returns whether it is that of a track, and not of a candidate for one.
+    #[must_use]
+    pub fn is_confirmed(&self) -> bool {
+        self.is_confirmed
+    }
+
+    /// Returns the motion at a stamp, with its growing covariance; none before the last accepted frame.
+    #[must_use]
+    pub fn at(&self, stamp_ns: i64) -> Option<Motion> {
+        let gap_s = seconds(stamp_ns, self.track.stamp_ns);
+        (gap_s >= 0.0).then(|| predict(&self.track.motion, gap_s, &self.noise))
+    }
+}
+
+impl Filter {
+    /// Returns the last motion of track or candidate; none without either.
+    #[must_use]
+    pub fn last_motion(&self) -> Option<LastMotion> {
+        let (track, noise, is_confirmed) = self.believed()?;
+        Some(LastMotion {
+            track,
+            noise,
+            is_confirmed,
+        })
+    }
+}
