@@ -6,8 +6,9 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::problem::Problem;
-use super::refine::{CentredPose, Fit};
+use super::centred_pose::CentredPose;
+use super::problem::{NEGLIGIBLE, Problem};
+use super::refine::Fit;
 
 /// Chord (about rad) under which two poses are the same minimum.
 pub(crate) const SAME_MINIMUM: f64 = 0.02;
@@ -18,10 +19,6 @@ pub(crate) fn likelihood_ratio(rival_chi_squared: f64, chosen_chi_squared: f64) 
         .exp()
         .min(1.0)
 }
-
-/// Chi-squared above that of the chosen pose at which a rival no longer counts: its likelihood is
-/// under 1e-13 of the chosen one's.
-pub(crate) const NEGLIGIBLE: f64 = 60.0;
 
 /// Returns the minimum in front of the camera that the mirrored target leads to; none when there is
 /// none that counts, or it is the chosen pose itself.

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
 
 use super::Observation;
+use super::centred_pose::CentredPose;
 use super::collinearity::object_space_weight;
-use super::refine::CentredPose;
 use super::symmetric3::Symmetric3;
 use crate::camera::{Camera, Ray};
 use crate::geometry::skew;

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
-use super::ambiguity::{self, NEGLIGIBLE, is_same, likelihood_ratio};
+use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::exclude::{self, Suspects};
 use super::initialise::{self, linear_rotation};
 use super::points::{INLINE_POINTS, mean};
-use super::problem::{Problem, Room};
+use super::problem::{NEGLIGIBLE, Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;
 use super::widen::honest_covariance;

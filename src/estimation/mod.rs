@@ -17,6 +17,7 @@
 //! | `K`    | [`Camera`]           | px                      |
 
 mod ambiguity;
+mod centred_pose;
 mod collinearity;
 mod columns;
 mod covariance;

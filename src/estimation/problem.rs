@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix6, Rotation3};
 
-use super::ambiguity;
+use super::centred_pose::CentredPose;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
 use super::four::{Arithmetic, Kernel, Plain, vectorised};
 use super::points::{Blocks, Points};
-use super::refine::{self, CentredPose, Fit, FitFailure};
+use super::refine::{self, Fit, FitFailure};
 use super::residuals::{LensResiduals, PinholeResiduals};
 use super::{EstimateError, Observation, Refinement, newton};
 use crate::camera::Camera;
@@ -16,6 +16,9 @@ use crate::camera::Camera;
 const START_TOLERANCE: f64 = 0.03;
 /// rad; convergence is quadratic, so the fixed point is then met to rounding.
 const FIXED_POINT_TOLERANCE: f64 = 1e-7;
+/// Chi-squared above that of the chosen pose at which a rival no longer counts: its likelihood is
+/// under 1e-13 of the chosen one's.
+pub(crate) const NEGLIGIBLE: f64 = 60.0;
 
 /// A frame with its camera: what every start and every rival pose shares.
 #[derive(Debug)]
@@ -268,7 +271,7 @@ impl<'a> Problem<'a> {
             self.points.radius,
         );
         if self.refinement == Refinement::MaximumLikelihood && depth > radius {
-            best.cost + ambiguity::NEGLIGIBLE * (depth + radius).powi(2)
+            best.cost + NEGLIGIBLE * (depth + radius).powi(2)
         } else {
             f64::INFINITY
         }

@@ -4,11 +4,9 @@
 //! model evaluated at the prediction, so that a distorted image is fitted where its noise lives.
 //! Steps that do not descend are damped (Levenberg-Marquardt).
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-
+use super::centred_pose::CentredPose;
 use super::information::{Solver, Vector};
 use super::residuals::{Residuals, Slope};
-use crate::geometry::cayley;
 
 /// Steps after which a fit is given up; two or three are usual.
 pub(crate) const MAX_ITERATIONS: u16 = 50;
@@ -16,18 +14,8 @@ pub(crate) const MAX_ITERATIONS: u16 = 50;
 const GAIN_TOLERANCE: f64 = 1e-6;
 /// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
-/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 0.15 % of
-/// themselves for the shipped maps, to about 1 % for a target that is flat and face on, or nearer than its size.
-const NEAR: f64 = 7e-4;
 /// Damping at which no step in any direction helps any more.
 const MAX_DAMPING: f64 = 1e9;
-
-/// A pose as the fit moves it: rotation, and the camera coordinates of the markers' mean.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct CentredPose {
-    pub(crate) rotation: Rotation3<f64>,
-    pub(crate) centre_in_camera: Vector3<f64>,
-}
 
 /// What a fit found.
 #[derive(Debug, Clone, Copy)]
@@ -156,36 +144,6 @@ fn finish(
 #[inline(always)]
 fn dot(a: &Vector, b: &Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-impl CentredPose {
-    /// Returns whether a step leaves the information as it is, to what [`NEAR`] says.
-    #[inline(always)]
-    fn is_near(&self, step: &Vector) -> bool {
-        let turn = Vector3::new(step[0], step[1], step[2]).norm_squared();
-        let motion = Vector3::new(step[3], step[4], step[5]).norm_squared();
-        turn < NEAR * NEAR && motion < (NEAR * self.centre_in_camera.z).powi(2)
-    }
-
-    /// Returns `camera_from_tanker`.
-    ///
-    /// # Inputs
-    /// * `lever`: from the tanker's origin to the markers' mean, camera axes, m.
-    #[inline(always)]
-    pub(crate) fn about_origin(&self, lever: &Vector3<f64>) -> Isometry3<f64> {
-        Isometry3::from_parts(
-            Translation3::from(self.centre_in_camera - lever),
-            UnitQuaternion::from_rotation_matrix(&self.rotation),
-        )
-    }
-
-    #[inline(always)]
-    pub(crate) fn moved(&self, step: &Vector) -> Self {
-        Self {
-            rotation: cayley(Vector3::new(step[0], step[1], step[2])) * self.rotation,
-            centre_in_camera: self.centre_in_camera + Vector3::new(step[3], step[4], step[5]),
-        }
-    }
 }
 
 /// Returns chi-squared and the squared residuals in px² at a pose; none when a point has no pixel there.

@@ -6,7 +6,7 @@ use super::sums::{Sums, Weight};
 use super::{Linearised, Residuals};
 use crate::camera::{Camera, Ray};
 use crate::estimation::Observation;
-use crate::estimation::refine::CentredPose;
+use crate::estimation::centred_pose::CentredPose;
 
 /// Points seen through any lens, one at a time: the lens model is evaluated at the prediction.
 pub(crate) struct LensResiduals<'a> {

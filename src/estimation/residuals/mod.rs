@@ -10,8 +10,8 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
+use super::centred_pose::CentredPose;
 use super::information::{Information, Vector};
-use super::refine::CentredPose;
 
 pub(crate) use lens::LensResiduals;
 pub(crate) use pinhole::PinholeResiduals;
