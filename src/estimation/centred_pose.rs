@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::information::Vector;
+use super::lanes::information::Vector;
 use crate::geometry::cayley;
 
 /// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 0.15 % of

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
 use super::Observation;
 use super::centred_pose::CentredPose;
 use super::collinearity::object_space_weight;
-use super::symmetric3::Symmetric3;
+use super::lanes::symmetric3::Symmetric3;
 use crate::camera::{Camera, Ray};
 use crate::geometry::skew;
 

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::exclude::{self, Suspects};
 use super::initialise::{self, linear_rotation};
-use super::points::{INLINE_POINTS, mean};
+use super::lanes::points::{INLINE_POINTS, mean};
 use super::problem::{NEGLIGIBLE, Problem, Room};
 use super::refine::Fit;
 use super::trust::TrustLimits;

@@ -11,7 +11,7 @@ use nalgebra::Isometry3;
 use smallvec::SmallVec;
 
 use super::ambiguity::likelihood_ratio;
-use super::points::INLINE_POINTS;
+use super::lanes::points::INLINE_POINTS;
 use super::{EstimateError, Excluded, Observation, Solution};
 use crate::geometry::pose_error;
 

@@ -19,20 +19,16 @@
 mod ambiguity;
 mod centred_pose;
 mod collinearity;
-mod columns;
 mod covariance;
 mod estimator;
 mod exclude;
-mod four;
-mod information;
 mod initialise;
+mod lanes;
 mod newton;
 mod orthogonal_iteration;
-mod points;
 mod problem;
 mod refine;
 mod residuals;
-mod symmetric3;
 mod trust;
 mod widen;
 

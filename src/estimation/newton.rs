@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::collinearity::CollinearityCost;
-use super::columns::{Columns, Splats};
-use super::four::{Arithmetic, Kernel, vectorised};
-use super::symmetric3::{positive_inverse, times};
+use super::lanes::columns::{Columns, Splats};
+use super::lanes::four::{Arithmetic, Kernel, vectorised};
+use super::lanes::symmetric3::{positive_inverse, times};
 use crate::geometry::{axial, cayley};
 
 /// Where a descent ended.

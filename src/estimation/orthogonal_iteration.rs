@@ -8,10 +8,10 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 use super::EstimateError;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
-use super::columns::Columns;
-use super::four::Plain;
+use super::lanes::columns::Columns;
+use super::lanes::four::Plain;
+use super::lanes::points::{Blocks, Points, mean};
 use super::newton::{self, Minimum};
-use super::points::{Blocks, Points, mean};
 use crate::camera::Ray;
 use crate::geometry::{chord, nearest_rotation, nearest_rotation_by_svd};
 

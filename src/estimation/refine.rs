@@ -5,7 +5,7 @@
 //! Steps that do not descend are damped (Levenberg-Marquardt).
 
 use super::centred_pose::CentredPose;
-use super::information::{Solver, Vector};
+use super::lanes::information::{Solver, Vector};
 use super::residuals::{Residuals, Slope};
 
 /// Steps after which a fit is given up; two or three are usual.

@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::ENTRY;
 use super::moments::CollinearityMoments;
-use crate::estimation::columns::{Columns, Splats};
-use crate::estimation::four::{Arithmetic, Four, LANES, Lane, Number};
-use crate::estimation::symmetric3::inverse;
+use crate::estimation::lanes::columns::{Columns, Splats};
+use crate::estimation::lanes::four::{Arithmetic, Four, LANES, Lane, Number};
+use crate::estimation::lanes::symmetric3::inverse;
 
 /// The collinearity error as a function of the rotation alone.
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 //! The sums over points that the cost is made of.
 
 use crate::camera::Ray;
-use crate::estimation::four::{Arithmetic, Four, LANES, Lane, Number};
-use crate::estimation::points::{Block, Points};
-use crate::estimation::symmetric3::Symmetric3;
+use crate::estimation::lanes::four::{Arithmetic, Four, LANES, Lane, Number};
+use crate::estimation::lanes::points::{Block, Points};
+use crate::estimation::lanes::symmetric3::Symmetric3;
 
 /// Returns `I − v vᵀ / (vᵀ v)`, the weight of the paper's object-space error.
 ///

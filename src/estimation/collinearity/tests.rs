@@ -3,10 +3,10 @@ use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
 use super::*;
 use crate::camera::{Camera, Pixel};
 use crate::estimation::Observation;
-use crate::estimation::columns::Columns;
-use crate::estimation::four::{LANES, Lane, Plain};
-use crate::estimation::points::{Blocks, Points};
-use crate::estimation::symmetric3::Symmetric3;
+use crate::estimation::lanes::columns::Columns;
+use crate::estimation::lanes::four::{LANES, Lane, Plain};
+use crate::estimation::lanes::points::{Blocks, Points};
+use crate::estimation::lanes::symmetric3::Symmetric3;
 use crate::geometry::skew;
 
 /// Relative; sums of a handful of products.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, SMatrix, SVector, Vector3, V
 
 use crate::camera::Ray;
 use crate::estimation::EstimateError;
-use crate::estimation::points::mean;
+use crate::estimation::lanes::points::mean;
 use crate::geometry::nearest_rotation_by_svd;
 
 type Matrix12 = SMatrix<f64, 12, 12>;

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 
 use crate::estimation::collinearity::{CollinearityCost, PRODUCTS, combined, products};
-use crate::estimation::four::{Arithmetic, Kernel, LANES, Lane, vectorised};
+use crate::estimation::lanes::four::{Arithmetic, Kernel, LANES, Lane, vectorised};
 use crate::estimation::newton::{self, Minimum};
 use crate::estimation::problem::Problem;
 

@@ -11,7 +11,7 @@ mod sums;
 mod tests;
 
 use super::centred_pose::CentredPose;
-use super::information::{Information, Vector};
+use super::lanes::information::{Information, Vector};
 
 pub(crate) use lens::LensResiduals;
 pub(crate) use pinhole::PinholeResiduals;

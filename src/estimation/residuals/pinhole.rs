@@ -3,8 +3,8 @@
 use super::sums::{SlopeSums, Sums, Weight};
 use super::{Linearised, Residuals, Slope};
 use crate::estimation::centred_pose::CentredPose;
-use crate::estimation::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory};
-use crate::estimation::points::{Block, Points};
+use crate::estimation::lanes::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory};
+use crate::estimation::lanes::points::{Block, Points};
 
 /// Points seen by a camera without distortion, four at a time.
 pub(crate) struct PinholeResiduals<'a, A> {

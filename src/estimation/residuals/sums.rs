@@ -1,8 +1,8 @@
 //! The sums over points that residuals and their derivatives are made of.
 
 use super::{Linearised, Slope};
-use crate::estimation::four::{Arithmetic, Four, Number, totals};
-use crate::estimation::information::Information;
+use crate::estimation::lanes::four::{Arithmetic, Four, Number, totals};
+use crate::estimation::lanes::information::Information;
 
 /// Sums over points of `M`, `[a]× M`, `[a]× M [a]×ᵀ`, `s`, `a × s` and the squared residuals.
 #[derive(Clone, Copy)]

@@ -1,8 +1,8 @@
 use super::*;
 use crate::camera::{Camera, CameraInfo};
 use crate::estimation::Observation;
-use crate::estimation::four::{Arithmetic, Kernel, Plain, vectorised};
-use crate::estimation::points::{Blocks, Points};
+use crate::estimation::lanes::four::{Arithmetic, Kernel, Plain, vectorised};
+use crate::estimation::lanes::points::{Blocks, Points};
 use crate::simulation::{Scene, paper_scene};
 
 struct Example {

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use smallvec::SmallVec;
 
 use super::four::{Arithmetic, Four, LANES, Lane, Number, Plain, totals};
-use super::{EstimateError, Observation};
 use crate::camera::{Camera, Ray};
+use crate::estimation::{EstimateError, Observation};
 
 /// Points kept without the heap.
 pub(crate) const INLINE_POINTS: usize = 64;
