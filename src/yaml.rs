@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use serde_saphyr::{DefaultMessageFormatter, Error, Location, MessageFormatter as _, Options};
 use serde_saphyr::{DuplicateKeyPolicy, MergeKeyPolicy};
 
-use crate::text::clip;
+use crate::text::quoted;
 
 /// A place that an error can point to: `config/tankers/paper.yaml:7:9`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,7 +89,7 @@ pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlErro
 fn plainly(error: &Error, text: &str, location: Location) -> String {
     let got = || match word_at(text, location) {
         "" => "nothing".to_owned(),
-        word => format!("{:?}", clip(word)),
+        word => quoted(word),
     };
     match error.without_snippet() {
         Error::InvalidScalar { ty, .. } => format!("expected {}, got {}", in_words(ty), got()),
@@ -101,14 +101,14 @@ fn plainly(error: &Error, text: &str, location: Location) -> String {
         Error::SerdeUnknownField {
             field, expected, ..
         } => format!(
-            "unknown key {:?}, expected {}",
-            clip(field),
+            "unknown key {}, expected {}",
+            quoted(field),
             expected.join(", ")
         ),
         Error::DuplicateMappingKey { key, .. } => {
             format!(
-                "duplicate key {:?}",
-                clip(key.as_deref().unwrap_or_default())
+                "duplicate key {}",
+                quoted(key.as_deref().unwrap_or_default())
             )
         }
         Error::MultipleDocuments { .. } => {

@@ -2,6 +2,7 @@
 
 use super::table::{FRAME_ID, Kind, ParameterSpec, TABLE, TEXT};
 use super::{ParameterError, ParameterValue};
+use crate::text::MAX_NAME_BYTES;
 
 /// Returns the table's own name, and the value in the type that the table gives it.
 pub(super) fn checked(
@@ -49,7 +50,10 @@ fn check(spec: &ParameterSpec, value: ParameterValue) -> Result<ParameterValue, 
             require(name, value, TEXT, |text| !text.trim().is_empty())
         }
         (Kind::FrameId { .. }, String(value)) => require(name, value, FRAME_ID, |text| {
-            !text.is_empty() && !text.starts_with('/') && !text.contains(char::is_whitespace)
+            !text.is_empty()
+                && !text.starts_with('/')
+                && !text.contains(char::is_whitespace)
+                && text.len() <= MAX_NAME_BYTES
         }),
         (kind, value) => Err(ParameterError::WrongType {
             name,

@@ -49,7 +49,7 @@ pub enum Kind {
 
 /// What a frame id has to be.
 pub(super) const FRAME_ID: &str =
-    "be a tf2 frame: not empty, without white space, not beginning with a slash";
+    "be a tf2 frame: not empty, without white space, not beginning with a slash, at most 255 bytes";
 /// What any other text has to be.
 pub(super) const TEXT: &str = "not be empty";
 

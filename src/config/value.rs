@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::text::clip;
+use crate::text::quoted;
 
 /// A value as it comes from a file, an argument or a service, before any check.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ impl fmt::Display for ParameterValue {
             Self::Bool(value) => write!(f, "{value}"),
             Self::Integer(value) => write!(f, "{value}"),
             Self::Double(value) => write!(f, "{value:?}"),
-            Self::String(value) => write!(f, "{:?}", clip(value)),
+            Self::String(value) => f.write_str(&quoted(value)),
         }
     }
 }
@@ -46,7 +46,7 @@ impl fmt::Display for ParameterValue {
 #[non_exhaustive]
 pub enum ParameterError {
     /// No such parameter.
-    #[error("unknown parameter {:?}{}", clip(name), suggest(*suggestion))]
+    #[error("unknown parameter {}{}", quoted(name), suggest(*suggestion))]
     Unknown {
         /// As it was written.
         name: String,
@@ -84,7 +84,7 @@ pub enum ParameterError {
         value: f64,
     },
     /// A word that is not among those allowed.
-    #[error("parameter {name:?} must be one of {}, got {:?}", allowed.join(", "), clip(value))]
+    #[error("parameter {name:?} must be one of {}, got {}", allowed.join(", "), quoted(value))]
     NotAllowed {
         /// The parameter.
         name: &'static str,
@@ -94,7 +94,7 @@ pub enum ParameterError {
         allowed: &'static [&'static str],
     },
     /// Text that cannot be used.
-    #[error("parameter {name:?} must {requirement}, got {:?}", clip(value))]
+    #[error("parameter {name:?} must {requirement}, got {}", quoted(value))]
     BadText {
         /// The parameter.
         name: &'static str,

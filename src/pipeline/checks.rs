@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use super::{Detection, Refusal, Stamp};
 use crate::camera::{Camera, Pixel};
 use crate::estimation::Observation;
+use crate::text::MAX_NAME_BYTES;
 
 /// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
 pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
@@ -19,6 +20,16 @@ pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
         return Err(Refusal::InvalidStamp(stamp));
     }
     Ok(())
+}
+
+/// Before all else that is said of a frame: even a refusal echoes its header.
+pub(super) fn check_frame_id_length(got: &str) -> Result<(), Refusal> {
+    if got.len() <= MAX_NAME_BYTES {
+        return Ok(());
+    }
+    Err(Refusal::FrameIdTooLong {
+        got: got.to_owned(),
+    })
 }
 
 pub(super) fn check_frame_id(expected: &str, got: &str) -> Result<(), Refusal> {

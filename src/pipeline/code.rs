@@ -83,7 +83,9 @@ impl Refusal {
         match self {
             Self::NoCameraInfo => OutcomeCode::NoCameraInfo,
             Self::InvalidCameraInfo(_) => OutcomeCode::InvalidCameraInfo,
-            Self::FrameMismatch { .. } | Self::OtherImage { .. } => OutcomeCode::FrameMismatch,
+            Self::FrameMismatch { .. } | Self::FrameIdTooLong { .. } | Self::OtherImage { .. } => {
+                OutcomeCode::FrameMismatch
+            }
             Self::InvalidStamp(_) => OutcomeCode::ZeroStamp,
             Self::UnknownId { .. }
             | Self::InvalidId { .. }

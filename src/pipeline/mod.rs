@@ -218,6 +218,7 @@ impl Pipeline {
     /// [`Refusal`] when the stamp is none, there is no camera, or not this one: what [`Self::process`] asks first.
     pub fn camera_for(&self, stamp: Stamp, frame_id: &str) -> Result<&Camera, Refusal> {
         checks::check_stamp(stamp)?;
+        checks::check_frame_id_length(frame_id)?;
         let latched = self.camera.as_ref().ok_or(Refusal::NoCameraInfo)?;
         let camera = latched
             .camera

@@ -4,7 +4,7 @@ use crate::camera::CameraError;
 use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
 
 use super::{FrameTrack, LeftOut, Stamp};
-use crate::text::{clip, digits, list};
+use crate::text::{clip, digits, list, quoted};
 
 /// Why a frame gives no pose. Each says what was expected and what came.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -21,6 +21,12 @@ pub enum Refusal {
     FrameMismatch {
         /// `frame_id` of the camera info.
         expected: String,
+        /// `frame_id` of the detections.
+        got: String,
+    },
+    /// A `frame_id` that would have to be echoed bit for bit, and is too long for that.
+    #[error("expected a frame_id of {limit} bytes at most, got '{}'", clip(got), limit = crate::text::MAX_NAME_BYTES)]
+    FrameIdTooLong {
         /// `frame_id` of the detections.
         got: String,
     },
@@ -49,9 +55,9 @@ pub enum Refusal {
     },
     /// A tag of another family.
     #[error(
-        "expected tag {id} of family {:?}, got family {:?}",
-        clip(expected),
-        clip(got)
+        "expected tag {id} of family {}, got family {}",
+        quoted(expected),
+        quoted(got)
     )]
     WrongFamily {
         /// The tag's id.
@@ -183,14 +189,6 @@ pub enum Refusal {
         /// The largest to accept.
         limit: f64,
     },
-}
-
-impl Refusal {
-    /// Returns a foreign word as messages show it: cut where it is long, without control characters.
-    #[must_use]
-    pub fn shown(word: &str) -> String {
-        clip(word).escape_debug().to_string()
-    }
 }
 
 impl From<EstimateError> for Refusal {

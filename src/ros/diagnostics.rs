@@ -5,6 +5,7 @@ use std::fmt;
 use std::time::Duration;
 
 use crate::pipeline::{OutcomeCode, TrackCode};
+use crate::text::{clip, line, quoted};
 use crate::tracking::TrackOutcome;
 
 use super::health::{Fault, Faults, WINDOW_S};
@@ -38,12 +39,12 @@ impl fmt::Display for CameraState {
                 frame_id,
                 size_px: Some((width, height)),
             } => {
-                write!(f, "valid, {width}x{height} px, frame {frame_id:?}")
+                write!(f, "valid, {width}x{height} px, frame {}", quoted(frame_id))
             }
             Self::Valid {
                 frame_id,
                 size_px: None,
-            } => write!(f, "valid, frame {frame_id:?}"),
+            } => write!(f, "valid, frame {}", quoted(frame_id)),
             Self::Invalid { reason } => write!(f, "invalid: {reason}"),
         }
     }
@@ -168,7 +169,7 @@ impl Reporter {
         let status = DiagnosticStatus {
             level,
             name: format!("{}: estimation", situation.node),
-            message,
+            message: line(&message).into_owned(),
             hardware_id: hardware_id(situation.camera),
             values: values(tally, rates, situation),
         };
@@ -220,7 +221,7 @@ fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u
 /// Returns the camera's frame, by which people know it; aggregators want something in any case.
 fn hardware_id(camera: &CameraState) -> String {
     match camera {
-        CameraState::Valid { frame_id, .. } if !frame_id.is_empty() => frame_id.clone(),
+        CameraState::Valid { frame_id, .. } if !frame_id.is_empty() => clip(frame_id),
         _ => "none".to_owned(),
     }
 }
@@ -249,13 +250,13 @@ fn faults(situation: &Situation) -> DiagnosticStatus {
     DiagnosticStatus {
         level,
         name: format!("{}: faults", situation.node),
-        message,
+        message: line(&message).into_owned(),
         hardware_id: hardware_id(situation.camera),
         values: Fault::ALL
             .iter()
             .map(|fault| KeyValue {
                 key: fault.name().to_owned(),
-                value: words(*fault),
+                value: line(&words(*fault)).into_owned(),
             })
             .collect(),
     }
@@ -277,7 +278,7 @@ fn values(tally: &Tally, rates: [(&str, String); 3], situation: &Situation) -> V
         ),
         ("camera_info".to_owned(), situation.camera.to_string()),
         ("camera_infos".to_owned(), tally.camera_infos.to_string()),
-        ("marker_map".to_owned(), situation.marker_map.to_owned()),
+        ("marker_map".to_owned(), clip(situation.marker_map)),
         (
             "last_message".to_owned(),
             situation.last_refusal.unwrap_or_default().to_owned(),
@@ -321,7 +322,10 @@ fn values(tally: &Tally, rates: [(&str, String); 3], situation: &Situation) -> V
     }));
     pairs
         .into_iter()
-        .map(|(key, value)| KeyValue { key, value })
+        .map(|(key, value)| KeyValue {
+            key,
+            value: line(&value).into_owned(),
+        })
         .collect()
 }
 

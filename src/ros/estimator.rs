@@ -26,6 +26,7 @@ use crate::pipeline::{
     Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, TrackCode,
 };
 use crate::refuelling::RefuellingSetup;
+use crate::text::{echoed, quoted};
 use crate::tracking::TrackOutcome;
 
 /// A topic that never makes the node wait: what a slow subscriber has no room for is dropped and
@@ -192,8 +193,12 @@ impl Estimator {
             return;
         }
         let sighting = self.reader.read(message);
-        let header = sighting.header;
-        let (frame, outcome) = self.outcome(&header, sighting.detections);
+        let (frame, outcome) = self.outcome(&sighting.header, sighting.detections);
+        // A frame whose name is too long for that is refused, so no pose has a cut one.
+        let header = Header {
+            frame_id: echoed(sighting.header.frame_id),
+            ..sighting.header
+        };
         let solve_time = begin.elapsed();
 
         let is_of_camera = self
@@ -389,7 +394,8 @@ impl Estimator {
         let is_same = *child == header.frame_id;
         if is_same && self.own_child.fault((), Instant::now()) {
             log::warn!(
-                "no odometry, no transform: the camera's frame and tanker_frame_id are both {child:?}"
+                "no odometry, no transform: the camera's frame and tanker_frame_id are both {}",
+                quoted(child)
             );
         }
         is_same
@@ -485,7 +491,7 @@ impl Estimator {
 /// no such thing, though its outcome has the same code.
 fn is_frame_mismatch(refusal: Option<&Refusal>, frame_id: &str) -> bool {
     match refusal {
-        Some(Refusal::FrameMismatch { .. }) => true,
+        Some(Refusal::FrameMismatch { .. } | Refusal::FrameIdTooLong { .. }) => true,
         Some(Refusal::OtherImage { frame_id: own, .. }) => !own.is_empty() && own != frame_id,
         _ => false,
     }

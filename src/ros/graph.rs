@@ -105,7 +105,7 @@ fn misfit(own: &OwnEnd, other: &OtherEnd) -> Option<Misfit> {
     let listens = own.role == Role::Subscription;
     if own.type_name != other.type_name {
         let (expected, got) = (ros_type(&own.type_name), ros_type(&other.type_name));
-        let got = clip(&got).escape_debug().to_string();
+        let got = clip(&got);
         return Some(Misfit::Type(if listens {
             format!("a publisher of {topic} sends {got}, expected {expected}: it is not heard")
         } else {

@@ -14,6 +14,7 @@ use ros2_client::{NodeLoggingHandle, RosoutRaw};
 
 use super::arguments::Arguments;
 use super::names::NodeNames;
+use crate::text;
 
 /// This package's own lines from info on; other crates' from warnings on, but the middleware's from
 /// errors on: it warns of every packet and every string that is not as it should be, which here is
@@ -138,7 +139,7 @@ fn write_line(
         out,
         "{style}[{}] [{sec}.{nanosec:09}] [{who}]: {}{style:#}",
         record.level(),
-        record.args()
+        text::line(&record.args().to_string())
     )
 }
 
@@ -175,7 +176,7 @@ impl Log for NodeLog {
                 Time::now(),
                 ros_level(record.level()),
                 &self.name,
-                &record.args().to_string(),
+                &text::line(&record.args().to_string()),
                 record.file().unwrap_or_default(),
                 record.module_path().unwrap_or_default(),
                 record.line().unwrap_or_default(),

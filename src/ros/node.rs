@@ -33,6 +33,7 @@ use crate::config::{AttitudeSource, Configuration};
 use crate::pipeline::Pipeline;
 use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
+use crate::text;
 
 /// What the node is called unless it is remapped.
 pub const NODE_NAME: &str = "tanker_pose";
@@ -74,7 +75,8 @@ pub enum NodeError {
     Parameters(#[from] StartParameterError),
     /// The marker map's file is missing, or not readable, or not text.
     #[error(
-        "parameter \"marker_map\": cannot read {path:?}: {source} (a path, or one of the shipped maps: paper, fin6)"
+        "parameter \"marker_map\": cannot read {}: {source} (a path, or one of the shipped maps: paper, fin6)",
+        text::path(path)
     )]
     MapUnreadable {
         /// The file.
@@ -299,10 +301,10 @@ pub(super) fn introduce(
     let names = ros.names();
     let topic = |name: &str| names.topic(name).unwrap_or_default();
     log::info!(
-        "{} in domain {}, marker map {:?} with {} markers",
+        "{} in domain {}, marker map {} with {} markers",
         names.fully_qualified(),
         environment.domain_id,
-        map.name(),
+        text::quoted(map.name()),
         map.markers().len(),
     );
     let optional = [

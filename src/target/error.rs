@@ -1,5 +1,6 @@
 //! Why a marker map cannot be used.
 
+use crate::text::quoted;
 use crate::yaml::{Place, YamlError};
 
 /// Why a marker map cannot be used; each message begins with the place at fault.
@@ -97,7 +98,10 @@ pub enum MarkerMapError {
     #[error("{place}: the quaternion of tag {id} must have length 1, got {norm}")]
     TagQuaternion { place: Place, id: u32, norm: f64 },
     /// A family that detectors cannot name.
-    #[error("{place}: family of tag {id} must be one word such as tag36h11, got {family:?}")]
+    #[error(
+        "{place}: family of tag {id} must be one word such as tag36h11, got {}",
+        quoted(family)
+    )]
     TagFamily {
         place: Place,
         id: u32,

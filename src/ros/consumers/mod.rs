@@ -24,6 +24,7 @@ use crate::ros::messages::{
 };
 use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, QosProfile, RosNode, reliable};
+use crate::text;
 use told::{Silence, Told};
 
 /// Where the receptacle is before the probe tip.
@@ -49,7 +50,7 @@ pub enum ConsumersError {
     #[error(transparent)]
     Outputs(#[from] OutputError),
     /// The setup's file.
-    #[error("parameter \"refuelling\": cannot read {path:?}: {source}")]
+    #[error("parameter \"refuelling\": cannot read {}: {source}", text::path(path))]
     Unreadable {
         /// The file.
         path: PathBuf,

@@ -2,6 +2,7 @@
 
 use crate::pipeline::{Detection, Refusal};
 use crate::ros::messages::{Detection2D, Detection2DArray, Header, ObjectHypothesisWithPose, Time};
+use crate::text::clip;
 
 /// Returns the detections of a message, all without a sigma of their own.
 ///
@@ -38,9 +39,9 @@ fn marker_id(found: &Detection2D) -> Result<u32, Refusal> {
             expected: "a whole number, 0 to 4294967295, in id or in the best hypothesis' class_id",
             got: format!(
                 "id '{}' and {}",
-                Refusal::shown(&found.id),
+                clip(&found.id),
                 class_id.map_or("no hypothesis".to_owned(), |class| {
-                    format!("class_id '{}'", Refusal::shown(class))
+                    format!("class_id '{}'", clip(class))
                 })
             ),
         }),
@@ -59,7 +60,7 @@ fn best_class(results: &[ObjectHypothesisWithPose]) -> Result<Option<&str>, Refu
         if !score.is_finite() {
             return Err(Refusal::InvalidId {
                 expected: "finite scores where there are several hypotheses",
-                got: format!("score {score:?} for class_id '{}'", Refusal::shown(class)),
+                got: format!("score {score:?} for class_id '{}'", clip(class)),
             });
         }
         match best {
@@ -77,8 +78,8 @@ fn best_class(results: &[ObjectHypothesisWithPose]) -> Result<Option<&str>, Refu
             expected: "one best hypothesis",
             got: format!(
                 "score {score} for class_id '{}' and for '{}'",
-                Refusal::shown(class),
-                Refusal::shown(other)
+                clip(class),
+                clip(other)
             ),
         }),
         _ => Ok(best.map(|(class, _)| class)),

@@ -13,7 +13,7 @@ use ros2_client::Publisher;
 use super::clock::NodeClock;
 use super::messages::TransitionEvent;
 use super::participant::{EndpointError, QosProfile, RosNode, reliable};
-use crate::text::clip;
+use crate::text::quoted;
 pub use states::{GRAPH, State, Transition, WorkResult};
 
 /// As rcl has it: its default for publishers.
@@ -70,9 +70,9 @@ impl Lifecycle {
             log::info!("{} after {}", after.label(), before.label());
         } else {
             log::error!(
-                "transition {} {:?} was asked for and not made: the node was {} and is {}",
+                "transition {} {} was asked for and not made: the node was {} and is {}",
                 request.id,
-                clip(&request.label),
+                quoted(&request.label),
                 before.label(),
                 after.label()
             );

@@ -9,7 +9,7 @@ use crate::ros::messages::{
     ListRequest, ListResult, ParameterDescriptor, SetParametersResult, WireParameter, WireValue,
 };
 use crate::ros::qos_overrides::{QosOverrides, QosParameter};
-use crate::text::clip;
+use crate::text::{echoed, quoted};
 
 /// The parameters of a running node, shared with its parameter services.
 #[derive(Debug, Clone)]
@@ -98,7 +98,7 @@ impl SharedParameters {
                     descriptor(name, value, &spec.kind, spec.description, spec.read_only)
                 }
                 _ => ParameterDescriptor {
-                    name: name.clone(),
+                    name: echoed(name.clone()),
                     ..ParameterDescriptor::default()
                 },
             }
@@ -156,8 +156,8 @@ impl SharedParameters {
         value: &WireValue,
     ) -> Result<(), String> {
         let value = plain_value(value).ok_or_else(|| {
-            let name = clip(name);
-            format!("parameter {name:?} needs a bool, a number or text, and cannot be unset")
+            let name = quoted(name);
+            format!("parameter {name} needs a bool, a number or text, and cannot be unset")
         })?;
         if let Some(qos) = self.qos.get(name) {
             // A file with all of the values as they are may be loaded.
@@ -165,7 +165,8 @@ impl SharedParameters {
                 Ok(())
             } else {
                 Err(format!(
-                    "parameter {name:?} is read-only: the topic is open with {}, restart the node to change it",
+                    "parameter {} is read-only: the topic is open with {}, restart the node to change it",
+                    quoted(name),
                     qos.value
                 ))
             };

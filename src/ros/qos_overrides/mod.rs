@@ -7,7 +7,7 @@ pub use endpoint::{Endpoint, Role};
 
 use super::participant::QosProfile;
 use crate::config::{Kind, ParameterValue};
-use crate::text::clip;
+use crate::text::quoted;
 use endpoint::Policy;
 
 /// What the names of all these parameters begin with.
@@ -18,8 +18,8 @@ pub const PREFIX: &str = "qos_overrides.";
 pub enum QosOverrideError {
     /// A name that no parameter of the topic has.
     #[error(
-        "unknown parameter {:?}: the node can override {prefix} reliability, durability, history, depth, deadline",
-        clip(name)
+        "unknown parameter {}: the node can override {prefix} reliability, durability, history, depth, deadline",
+        quoted(name)
     )]
     Policy {
         /// As it was written.
@@ -28,7 +28,7 @@ pub enum QosOverrideError {
         prefix: String,
     },
     /// A value that the policy cannot have.
-    #[error("parameter {name:?} must be {expected}, got {value} ({})", value.type_name())]
+    #[error("parameter {} must be {expected}, got {value} ({})", quoted(name), value.type_name())]
     Value {
         /// The parameter.
         name: String,
