@@ -4,7 +4,8 @@ use nalgebra::Rotation3;
 
 use super::{ConsumerConfiguration, Parameters, Settings};
 use crate::estimation::{EstimatorSettings, Initialisation, Refinement};
-use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
+use crate::geometry::optical_from_body;
+use crate::refuelling::{Angles, ExpectedAttitude};
 use crate::tracking::FilterSettings;
 
 /// Everything that the parameters say, in the types that the node works with.
@@ -36,6 +37,19 @@ pub struct Configuration {
     pub max_hamming: i32,
     /// What refuelling and flight stacks are told.
     pub consumers: ConsumerConfiguration,
+    /// How the camera is turned, and the tanker should be.
+    pub expected_attitude: ExpectedAttitude,
+}
+
+impl Configuration {
+    /// Returns whether estimates start from the nominal attitude, always or while there is no better.
+    #[must_use]
+    pub const fn starts_from_nominal(&self) -> bool {
+        matches!(
+            self.settings.estimator.initialisation,
+            Initialisation::Nominal | Initialisation::Previous
+        )
+    }
 }
 
 /// Which messages bring the detections.
@@ -76,6 +90,7 @@ impl From<&Parameters> for Configuration {
             },
             max_hamming: i32::try_from(parameters.count("max_hamming")).unwrap_or(0),
             consumers: ConsumerConfiguration::from(parameters),
+            expected_attitude: expected_attitude(parameters),
         }
     }
 }
@@ -128,20 +143,25 @@ pub fn nominal_camera_from_tanker(
 }
 
 fn nominal_attitude(parameters: &Parameters) -> Rotation3<f64> {
-    nominal_camera_from_tanker(
-        &turned(parameters, "nominal"),
-        &turned(parameters, "camera_mount"),
-    )
+    let ExpectedAttitude { mount, nominal, .. } = expected_attitude(parameters);
+    nominal_camera_from_tanker(&nominal.rotation(), &mount.rotation())
 }
 
-/// Returns the rotation that three parameters of this prefix say: Rz(yaw) Ry(pitch) Rx(roll).
-pub(super) fn turned(parameters: &Parameters, prefix: &str) -> Rotation3<f64> {
-    let angle = |axis: &str| {
-        parameters
-            .double(&format!("{prefix}_{axis}_deg"))
-            .to_radians()
-    };
-    rotation_from_roll_pitch_yaw(angle("roll"), angle("pitch"), angle("yaw"))
+pub(super) fn expected_attitude(parameters: &Parameters) -> ExpectedAttitude {
+    ExpectedAttitude {
+        mount: angles(parameters, "camera_mount"),
+        nominal: angles(parameters, "nominal"),
+        limit_deg: parameters.double("max_attitude_deviation_deg"),
+    }
+}
+
+fn angles(parameters: &Parameters, prefix: &str) -> Angles {
+    let angle_deg = |axis: &str| parameters.double(&format!("{prefix}_{axis}_deg"));
+    Angles {
+        roll_deg: angle_deg("roll"),
+        pitch_deg: angle_deg("pitch"),
+        yaw_deg: angle_deg("yaw"),
+    }
 }
 
 #[cfg(test)]

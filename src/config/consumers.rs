@@ -3,8 +3,7 @@
 use nalgebra::{Matrix3, Rotation3};
 
 use super::Parameters;
-use super::configuration::turned;
-use crate::geometry::optical_from_body;
+use super::configuration::expected_attitude;
 
 /// Where the receiver's attitude comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,8 +174,7 @@ impl From<&Parameters> for ConsumerConfiguration {
                 path => Some(path.to_owned()),
             },
             receiver_frame_id: parameters.text("receiver_frame_id").to_owned(),
-            receiver_from_camera: turned(parameters, "camera_mount")
-                * optical_from_body().inverse(),
+            receiver_from_camera: expected_attitude(parameters).receiver_from_camera(),
             receptacle: parameters.bool("publish_receptacle"),
             px4_landing_target: parameters.bool("publish_px4_landing_target"),
             px4_fiducial_marker: parameters.bool("publish_px4_fiducial_marker"),

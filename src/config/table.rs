@@ -238,6 +238,17 @@ pub const TABLE: &[ParameterSpec] = &[
         "deg, yaw of the camera in the receiver; positive: it looks left",
     ),
     ParameterSpec {
+        name: "max_attitude_deviation_deg",
+        kind: Kind::Double {
+            default: 15.0,
+            min: 1.0,
+            max: 180.0,
+        },
+        read_only: false,
+        description: "deg, farthest that the tanker may stand off its nominal attitude: beyond it receptacle and flight-stack \
+                      outputs are held back, and unexpected_attitude is a fault after 3 s; 180: any attitude is allowed",
+    },
+    ParameterSpec {
         name: "refuelling",
         kind: Kind::Text { default: "none" },
         read_only: true,

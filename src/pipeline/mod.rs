@@ -14,6 +14,7 @@ mod edge;
 mod next_image;
 mod outcome;
 mod predict;
+mod residuals;
 mod stamp;
 mod track;
 
@@ -33,6 +34,7 @@ pub use next_image::NextImage;
 pub use outcome::{FrameOutcome, Refusal};
 pub use predict::PredictedPoint;
 use predict::Predictor;
+pub use residuals::MarkerResidual;
 pub use stamp::Stamp;
 use track::Tracker;
 pub use track::{FrameTrack, TrackCode};

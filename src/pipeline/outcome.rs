@@ -155,7 +155,7 @@ pub enum Refusal {
     },
     /// The best fit is a mirror image.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m: ids exchanged, or a wrong detection?",
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m: ids exchanged, a wrong detection, or a wrong camera_mount?",
         digits(*depth_m)
     )]
     BehindCamera {

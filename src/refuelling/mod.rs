@@ -13,12 +13,16 @@
 //! the tanker's markers, up to [`RefuellingGeometry::receptacle_covariance`]: a drogue on a hose is not,
 //! and needs beacons of its own.
 
+mod attitude;
 mod envelope;
+mod in_words;
 mod probability;
 mod receptacle;
 mod setup;
 
+pub use attitude::{Angles, ExpectedAttitude};
 pub use envelope::{Assessment, Envelope, EnvelopeError, EnvelopeState, Region};
+pub use in_words::Understood;
 pub use receptacle::{ReceptacleEstimate, RefuellingGeometry, RefuellingGeometryError, Uncertain};
 pub use setup::{RefuellingSetup, RefuellingSetupError};
 

@@ -10,15 +10,18 @@ use super::consumers::Consumers;
 use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
-use super::health::{Fault, Second, SystemClock, Watch, both_clocks, seconds_between};
+use super::health::{
+    Doubtful, Fault, ImageAge, Second, SystemClock, Watch, both_clocks, seconds_between,
+};
 use super::input::{InputMessage, InputReader};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
-    PoseWithCovarianceStamped, TFMessage,
+    PoseWithCovarianceStamped, TFMessage, Time,
 };
 use super::node::{ATTITUDE, CAMERA_INFO};
 use super::once::SaidOnce;
 use super::predicted_points::PredictedPoints;
+use super::understood::say_understood;
 use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
@@ -207,7 +210,11 @@ impl Estimator {
             .is_ok();
         if is_of_camera && !is_frame_mismatch(outcome.result.as_ref().err(), &frame.frame_id) {
             self.watch.on_image(header.stamp, begin);
+            if let Some(image) = self.age_of(header.stamp) {
+                self.watch.on_age(image, begin);
+            }
         }
+        self.watch_fit(&frame, &outcome, begin);
         if let Ok(solution) = &outcome.result {
             let excluded = &solution.excluded;
             let ids = frame.detections.iter().map(|seen| seen.id);
@@ -215,6 +222,8 @@ impl Estimator {
             let ids = ids.filter(|id| !outcome.left_out.ids.contains(id));
             let markers = ids.map(|id| (id, excluded.contains(id)));
             self.watch.on_pose(markers, begin);
+            let rotation = &solution.camera_from_tanker.rotation;
+            let unexpected = self.watch.on_attitude(rotation, begin);
             self.outputs
                 .pose
                 .publish(convert::pose(header.clone(), solution), &mut self.tally);
@@ -222,7 +231,11 @@ impl Estimator {
             if let Some(consumers) = &mut self.outputs.consumers {
                 let corrected = outcome.track.code() == TrackCode::Updated;
                 let motion = outcome.track.motion.as_ref().filter(|_| corrected);
-                consumers.on_pose(&header, solution, motion, &mut self.tally);
+                let place = match unexpected {
+                    Some(unexpected) => Err(unexpected),
+                    None => Ok((solution, motion)),
+                };
+                consumers.on_pose(&header, place, &mut self.tally);
             }
         }
         self.publish_odometry(&header, &outcome);
@@ -266,6 +279,36 @@ impl Estimator {
         (frame, outcome)
     }
 
+    /// Returns how old an image is by the node's time; none while that stands still for want of `/clock`.
+    fn age_of(&self, stamp: Time) -> Option<ImageAge> {
+        let silence = self.clock.silence();
+        if silence.is_some_and(|silence| !silence.ever) {
+            return None;
+        }
+        Some(ImageAge {
+            age_s: seconds_between(stamp, self.clock.now()),
+            stamp_s: stamp.sec,
+            is_simulated: silence.is_some(),
+        })
+    }
+
+    /// Lets the watch see how the fit of a frame is judged by its residuals, if it has one.
+    fn watch_fit(&mut self, frame: &DetectionFrame, outcome: &FrameOutcome, now: Instant) {
+        match (outcome.code(), outcome.solution()) {
+            (OutcomeCode::NotTrusted, Some(solution)) => {
+                let residuals = self.pipeline.residuals(frame, outcome);
+                let doubtful = Doubtful {
+                    chi_squared: solution.chi_squared,
+                    degrees_of_freedom: solution.degrees_of_freedom,
+                    residuals: &residuals,
+                };
+                self.watch.on_fit(Some(doubtful), now);
+            }
+            (_, Some(_)) => self.watch.on_fit(None, now),
+            _ => {}
+        }
+    }
+
     /// Takes a sample of the receiver's attitude.
     pub fn on_attitude(&mut self, message: &AttitudeMessage) {
         self.watch.on_decoded(ATTITUDE);
@@ -279,14 +322,30 @@ impl Estimator {
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_configuration(&configuration.consumers);
         }
-        self.warn_of_too_small_map(&configuration);
+        self.understand(&configuration);
         self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
         self.note_camera();
     }
 
-    /// Says what would refuse every frame from now on, if it is not as it was.
-    pub fn warn_of_too_small_map(&mut self, configuration: &Configuration) {
+    /// Takes note of what a configuration means for faults, and says what of it is new: mount, lever arms and nominal
+    /// attitude in words, and what would refuse every frame from now on.
+    pub fn understand(&mut self, configuration: &Configuration) {
+        let consumers = self.outputs.consumers.as_ref();
+        let expected = &configuration.expected_attitude;
+        let is_used = consumers.is_some() || configuration.starts_from_nominal();
+        if self
+            .watch
+            .expect(is_used.then_some(expected), consumers.is_some())
+        {
+            let geometry = consumers.map(Consumers::geometry);
+            let need = configuration.settings.estimator.min_points;
+            say_understood(expected, geometry, &self.reader.map, need);
+        }
+        self.warn_of_too_small_map(configuration);
+    }
+
+    fn warn_of_too_small_map(&mut self, configuration: &Configuration) {
         let estimator = &configuration.settings.estimator;
         let need = estimator
             .min_points
@@ -303,6 +362,7 @@ impl Estimator {
     /// Forgets the track and the last attitude.
     pub fn on_reset(&mut self) {
         self.pipeline.reset();
+        self.watch.on_reset();
         log::info!("track and last attitude are forgotten, as asked by ~/reset");
     }
 

@@ -55,3 +55,4 @@ mod scalar;
 mod serve;
 pub mod service;
 pub mod start_values;
+mod understood;

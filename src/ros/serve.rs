@@ -277,7 +277,7 @@ impl<'a> Server<'a> {
         let map = Arc::new(map);
         introduce(self.ros, self.environment, &map, configuration);
         let mut estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
-        estimator.warn_of_too_small_map(configuration);
+        estimator.understand(configuration);
         self.work = Work::Ready(Box::new(estimator));
         Ok(())
     }

@@ -61,6 +61,8 @@ def outputs_with(px4: str) -> list[str]:
 
 def all_on(attitude: str, px4: str, setup: Path) -> list[str]:
     arguments = ["-p", f"refuelling:={setup}", "-p", f"attitude:={attitude}"]
+    # The tanker of this approach is turned by tens of degrees, so that no convention is without effect.
+    arguments += ["-p", "max_attitude_deviation_deg:=60.0"]
     for name in outputs_with(px4):
         arguments += ["-p", f"publish_{name}:=true"]
     return arguments

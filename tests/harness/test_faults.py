@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -17,7 +19,7 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import String
 from tanker_pose.msg import FeaturePointArray
 
-from harness import messages
+from harness import messages, paper
 from harness.conftest import StartNode
 from harness.peer import BEST_EFFORT, LATCHED, RELIABLE, Peer
 from harness.processes import Process
@@ -195,6 +197,67 @@ def misplace_a_marker(scene: Scene) -> None:
     scene.message = message
 
 
+def misplace_all_markers(scene: Scene) -> None:
+    # A map that is some centimetres off everywhere: 2 px, the same in every image.
+    spoil_pixels(scene, lambda: np.random.default_rng(5).normal(0.0, 2.0, (len(paper.MARKERS), 2)))
+
+
+def scatter_markers(scene: Scene) -> None:
+    # A detector that is four times worse than its sigma.
+    rng = np.random.default_rng(6)
+    spoil_pixels(scene, lambda: rng.normal(0.0, 4 * messages.SIGMA_PX, (len(paper.MARKERS), 2)))
+
+
+def spoil_pixels(scene: Scene, errors: Callable[[], np.ndarray]) -> None:
+    both(scene)
+    good = Scene.message
+
+    def message(topic: str) -> object:
+        told = good(scene, topic)
+        if topic == "/feature_points":
+            for point, (u, v) in zip(told.points, errors(), strict=True):
+                point.u += u
+                point.v += v
+        return told
+
+    scene.message = message
+
+
+def pitch_the_tanker(scene: Scene) -> None:
+    both(scene)
+    good = Scene.message
+    pose = paper.camera_from_tanker(0.0, 20.0, 0.0, (15.0, 0.0, 4.5))
+
+    def message(topic: str) -> object:
+        return (
+            messages.exact_frame(scene.index, pose)
+            if topic == "/feature_points"
+            else good(scene, topic)
+        )
+
+    scene.message = message
+
+
+def stamp_by_a_clock_that_is_ahead(by_s: float) -> Callable[[Scene], None]:
+    def provoke(scene: Scene) -> None:
+        scene.message = lambda topic: stamped(
+            Scene.message(scene, topic), scene.peer.node.get_clock().now(), by_s
+        )
+        both(scene)
+
+    return provoke
+
+
+def stamp_since_start(scene: Scene) -> None:
+    def message(topic: str) -> object:
+        told = Scene.message(scene, topic)
+        told.header.stamp = Time(sec=500 + scene.index)
+        return told
+
+    scene.message = message
+    both(scene)
+
+
 def jump(by: int) -> Callable[[Scene], None]:
     def provoke(scene: Scene) -> None:
         scene.index = FAR_AHEAD
@@ -325,6 +388,43 @@ CASES = {
         misplace_a_marker,
         send_good,
     ),
+    "map that is off": Case(
+        "not_trusted",
+        "the residuals point the same way in frame after frame: the marker map or the calibration",
+        misplace_all_markers,
+        send_good,
+    ),
+    "sigma that is too small": Case(
+        "not_trusted",
+        "the sigmas (pixel_sigma_px, or those of the detections) are too small",
+        scatter_markers,
+        send_good,
+    ),
+    "tanker off its nominal attitude": Case(
+        "unexpected_attitude",
+        "the tanker stands 20.0° off its nominal attitude",
+        pitch_the_tanker,
+        send_good,
+    ),
+    "detector's clock ahead": Case(
+        "clock_offset",
+        "s in the future by this machine's clock: the clock of the machine that stamps the images (camera or detector) is "
+        "not synchronised",
+        stamp_by_a_clock_that_is_ahead(23.0),
+        stamp_by_a_clock_that_is_ahead(0.0),
+    ),
+    "images of yesterday": Case(
+        "clock_offset",
+        "s old by this machine's clock",
+        stamp_by_a_clock_that_is_ahead(-86_400.0),
+        stamp_by_a_clock_that_is_ahead(0.0),
+    ),
+    "stamps since the start of a machine": Case(
+        "clock_offset",
+        "they count from a start",
+        stamp_since_start,
+        stamp_by_a_clock_that_is_ahead(0.0),
+    ),
     "stamps go back": Case("stamp_jump", "back by", jump(-1000), nothing),
     "stamps go far ahead": Case("stamp_jump", "ahead by", jump(10_000), nothing),
     "clock goes back": Case("clock_jump", "back by", turn_clock(-500), nothing, SIM_TIME),
@@ -432,7 +532,7 @@ def test_a_healthy_node_reports_rates_and_latencies_and_no_faults(
 ) -> None:
     scene = make_scene()
     now = scene.peer.node.get_clock()
-    scene.message = lambda topic: stamped_now(Scene.message(scene, topic), now)
+    scene.message = lambda topic: stamped(Scene.message(scene, topic), now.now())
     both(scene)
     scene.step_until(lambda: rates(scene).keys() >= RATES, "rates of input, camera and pose")
     scene.steps_for(2.0)
@@ -448,6 +548,6 @@ def test_a_healthy_node_reports_rates_and_latencies_and_no_faults(
     assert 0.0 < float(values["image_age_p50_ms"]) <= float(values["image_age_p99_ms"]) < 1e4
 
 
-def stamped_now(message, clock):
-    message.header.stamp = clock.now().to_msg()
+def stamped(message, now, by_s: float = 0.0):
+    message.header.stamp = (now + Duration(nanoseconds=int(by_s * 1e9))).to_msg()
     return message

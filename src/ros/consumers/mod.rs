@@ -18,6 +18,7 @@ use crate::refuelling::{RefuellingGeometry, RefuellingSetup, RefuellingSetupErro
 use crate::ros::attitude::AttitudeMessage;
 use crate::ros::convert;
 use crate::ros::diagnostics::Tally;
+use crate::ros::health::Unexpected;
 use crate::ros::messages::{
     DiagnosticStatus, FiducialMarkerPosReport, Header, KeyValue, LandingTarget, LandingTargetPose,
     Message, PoseStamped, ReceptacleState,
@@ -180,8 +181,37 @@ impl Consumers {
         }
     }
 
-    /// Tells a frame's trusted pose, and the track at its stamp if the frame has corrected one.
+    /// Returns what is fixed to the two aircraft.
+    #[must_use]
+    pub const fn geometry(&self) -> &RefuellingGeometry {
+        &self.geometry
+    }
+
+    /// Tells a frame's trusted pose, and the track at its stamp if the frame has corrected one; or nothing, while the
+    /// tanker's attitude shows that they would be misread.
     pub fn on_pose(
+        &mut self,
+        header: &Header,
+        place: Result<(&Solution, Option<&Motion>), Unexpected>,
+        tally: &mut Tally,
+    ) {
+        match place {
+            Ok((solution, camera_from_tanker)) => {
+                self.tell(header, solution, camera_from_tanker, tally);
+            }
+            Err(unexpected) => self.hold_back(unexpected.into(), tally),
+        }
+    }
+
+    fn hold_back(&mut self, silence: Silence, tally: &mut Tally) {
+        hold_back(&mut self.receptacle, silence, tally);
+        hold_back(&mut self.px4_landing_target, silence, tally);
+        hold_back(&mut self.px4_fiducial_marker, silence, tally);
+        hold_back(&mut self.mavros_landing_target, silence, tally);
+        hold_back(&mut self.mavros_pose, silence, tally);
+    }
+
+    fn tell(
         &mut self,
         header: &Header,
         solution: &Solution,
@@ -296,6 +326,12 @@ impl Consumers {
             rate_in_b: found.rate_in_body,
             rate_covariance: self.configuration.attitude_rate_covariance,
         })
+    }
+}
+
+fn hold_back<M: Message>(told: &mut Option<Told<M>>, silence: Silence, tally: &mut Tally) {
+    if let Some(told) = told {
+        told.tell(Err(silence), tally);
     }
 }
 

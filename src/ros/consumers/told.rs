@@ -7,6 +7,7 @@ use crate::frames::AttitudeError;
 use crate::ros::convert::FlightStackError;
 use crate::ros::diagnostics::Tally;
 use crate::ros::estimator::Output;
+use crate::ros::health::Unexpected;
 use crate::ros::messages::{KeyValue, Message};
 use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, RosNode};
@@ -22,6 +23,17 @@ pub(super) enum Silence {
     NoTrack,
     #[error("there is no probability for this covariance")]
     NoProbability,
+    #[error(
+        "the tanker stands {:.1}° off its nominal attitude, or did within the last seconds, expected are {}° at most: \
+         see unexpected_attitude", .0.off_deg, .0.limit_deg
+    )]
+    UnexpectedAttitude(Unexpected),
+}
+
+impl From<Unexpected> for Silence {
+    fn from(unexpected: Unexpected) -> Self {
+        Self::UnexpectedAttitude(unexpected)
+    }
 }
 
 /// An output with what became of its frames.

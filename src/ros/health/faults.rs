@@ -22,6 +22,12 @@ pub enum Fault {
     FrameMismatch,
     /// A marker is left out of every pose.
     SuspectMarker,
+    /// Frame after frame is not trusted.
+    NotTrusted,
+    /// The tanker stands off its nominal attitude.
+    UnexpectedAttitude,
+    /// Images are from the future, or from long ago.
+    ClockOffset,
     /// Stamps of detections go back, or far ahead.
     StampJump,
     /// The simulated time goes back, or far ahead, or the system's back.
@@ -45,7 +51,7 @@ const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -54,6 +60,9 @@ impl Fault {
         Self::StaleCameraInfo,
         Self::FrameMismatch,
         Self::SuspectMarker,
+        Self::NotTrusted,
+        Self::UnexpectedAttitude,
+        Self::ClockOffset,
         Self::StampJump,
         Self::ClockJump,
         Self::NoClock,
@@ -74,6 +83,9 @@ impl Fault {
             Self::StaleCameraInfo => "stale_camera_info",
             Self::FrameMismatch => "frame_mismatch",
             Self::SuspectMarker => "suspect_marker",
+            Self::NotTrusted => "not_trusted",
+            Self::UnexpectedAttitude => "unexpected_attitude",
+            Self::ClockOffset => "clock_offset",
             Self::StampJump => "stamp_jump",
             Self::ClockJump => "clock_jump",
             Self::NoClock => "no_clock",
@@ -87,9 +99,12 @@ impl Fault {
     const fn lasts(self) -> Duration {
         match self {
             Self::StampJump | Self::ClockJump | Self::LostInput | Self::DroppedOutput => EVENT,
-            Self::NoCameraInfo | Self::FrameMismatch | Self::SuspectMarker | Self::Undecodable => {
-                SHOWN_BY_FRAMES
-            }
+            Self::NoCameraInfo
+            | Self::FrameMismatch
+            | Self::SuspectMarker
+            | Self::NotTrusted
+            | Self::ClockOffset
+            | Self::Undecodable => SHOWN_BY_FRAMES,
             // Looked for every second.
             _ => Duration::ZERO,
         }
@@ -98,11 +113,28 @@ impl Fault {
 
 #[derive(Debug)]
 struct Open {
-    said: String,
     latest: String,
     since: Instant,
     seen: Instant,
     over: bool,
+}
+
+impl Open {
+    /// Returns the line for its end: how long it lasted, by when it was seen last, in its last words.
+    fn epitaph(&self, fault: Fault, now: Instant) -> String {
+        let (name, latest) = (fault.name(), &self.latest);
+        let seconds = self
+            .seen
+            .saturating_duration_since(self.since)
+            .as_secs_f64();
+        let unseen = now.saturating_duration_since(self.seen).as_secs_f64();
+        let ago = if unseen < 2.0 * OVER.as_secs_f64() {
+            String::new()
+        } else {
+            format!(" (last seen {unseen:.0} s ago)")
+        };
+        format!("{name} is over after {seconds:.1} s{ago}: {latest}")
+    }
 }
 
 /// The faults that last now.
@@ -128,7 +160,6 @@ impl Faults {
         }
         log::warn!("{}: {words}", fault.name());
         let open = Open {
-            said: words.to_owned(),
             latest: words.to_owned(),
             since: now,
             seen: now,
@@ -161,9 +192,7 @@ impl Faults {
             let lasts = if open.over { OVER } else { fault.lasts() };
             let stays = now.saturating_duration_since(open.seen) <= lasts;
             if !stays {
-                let seconds = now.saturating_duration_since(open.since).as_secs_f64();
-                let (name, said) = (fault.name(), &open.said);
-                log::info!("{name} is over after {seconds:.1} s: {said}");
+                log::info!("{}", open.epitaph(*fault, now));
             }
             stays
         });
@@ -211,6 +240,22 @@ mod tests {
         assert_eq!(open(&faults).len(), 3);
         faults.end_unseen(start + 4 * SECOND);
         assert_eq!(open(&faults), [(Fault::DroppedOutput, "full")]);
+    }
+
+    #[test]
+    fn end_tells_the_time_until_a_fault_was_seen_last_in_its_last_words() {
+        let (mut faults, start) = (Faults::default(), Instant::now());
+        faults.see(Fault::SuspectMarker, "all 31 poses", start);
+        faults.see(Fault::SuspectMarker, "all 90 poses", start + 6 * SECOND);
+        let open = &faults.open[&(Fault::SuspectMarker, String::new())];
+        assert_eq!(
+            open.epitaph(Fault::SuspectMarker, start + 17 * SECOND),
+            "suspect_marker is over after 6.0 s (last seen 11 s ago): all 90 poses"
+        );
+        assert_eq!(
+            open.epitaph(Fault::SuspectMarker, start + 7 * SECOND),
+            "suspect_marker is over after 6.0 s: all 90 poses"
+        );
     }
 
     #[test]

@@ -3,7 +3,13 @@
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use super::{Fault, Faults, Jumps, Latency, Suspects};
+use nalgebra::UnitQuaternion;
+
+use super::{
+    Attitude, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge, Suspects,
+    Unexpected,
+};
+use crate::refuelling::ExpectedAttitude;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
 
@@ -115,6 +121,12 @@ pub struct Watch {
     cameras: usize,
     stamps: Jumps,
     suspects: Suspects,
+    residuals: Residuals,
+    stamp_age: StampAge,
+    /// Judges where the tanker stands; none while nothing depends on that.
+    attitude: Option<Attitude>,
+    /// Whether outputs stop while it stands where it should not.
+    holds_outputs: bool,
     waiting_said: bool,
     without_camera: Option<WithoutCamera>,
 }
@@ -143,6 +155,10 @@ impl Watch {
             cameras: 0,
             stamps: Jumps::default(),
             suspects: Suspects::default(),
+            residuals: Residuals::default(),
+            stamp_age: StampAge::default(),
+            attitude: None,
+            holds_outputs: false,
             waiting_said: false,
             without_camera: None,
         }
@@ -182,6 +198,59 @@ impl Watch {
                  faster than it takes them"
             );
             self.faults.see_of(Fault::LostInput, topic, &words, now);
+        }
+    }
+
+    /// Takes what attitude is expected from now on, if anything depends on it, and whether outputs do. Returns whether
+    /// it differs from before.
+    pub fn expect(&mut self, expected: Option<&ExpectedAttitude>, holds_outputs: bool) -> bool {
+        self.holds_outputs = holds_outputs;
+        match (&mut self.attitude, expected) {
+            (Some(attitude), Some(expected)) => attitude.expect(expected),
+            (attitude, expected) => {
+                let differs = attitude.is_some() != expected.is_some();
+                *attitude = expected.map(|expected| Attitude::new(*expected));
+                differs
+            }
+        }
+    }
+
+    /// Forgets the poses before, as the node does.
+    pub fn on_reset(&mut self) {
+        if let Some(attitude) = &mut self.attitude {
+            attitude.begin_anew();
+        }
+    }
+
+    /// Takes note of where a trusted pose has the tanker; returns how that is off what is expected, if it is.
+    pub fn on_attitude(
+        &mut self,
+        camera_from_tanker: &UnitQuaternion<f64>,
+        now: Instant,
+    ) -> Option<Unexpected> {
+        let attitude = self.attitude.as_mut()?;
+        attitude.take(camera_from_tanker, now);
+        attitude.unexpected()
+    }
+
+    /// Takes note of a fit: a trusted one, or one that is not, with its residuals.
+    pub fn on_fit(&mut self, doubtful: Option<Doubtful>, now: Instant) {
+        self.residuals.take(doubtful, now);
+        match self.residuals.in_words() {
+            Some(words) => self.faults.see(Fault::NotTrusted, &words, now),
+            None => self.faults.end(Fault::NotTrusted),
+        }
+    }
+
+    /// Takes note of the age of an image from the camera's frame.
+    pub fn on_age(&mut self, image: ImageAge, now: Instant) {
+        match self.stamp_age.take(image, now) {
+            Some(Some(words)) => {
+                let words = format!("stamps of {} {words}", self.detections_topic);
+                self.faults.see(Fault::ClockOffset, &words, now);
+            }
+            Some(None) => self.faults.end(Fault::ClockOffset),
+            None => {}
         }
     }
 
@@ -258,6 +327,7 @@ impl Watch {
             self.faults.see(Fault::NoCameraInfo, &words, now);
         }
         self.watch_inputs(detectors, cameras, now);
+        self.watch_attitude(now);
         if let Some(words) = second.system_clock {
             self.faults.see_of(Fault::ClockJump, "system", &words, now);
         }
@@ -321,6 +391,20 @@ impl Watch {
             let topic = detections.trim_start_matches('/');
             log::info!("waiting for {topic}: nobody publishes them yet");
         }
+    }
+
+    fn watch_attitude(&mut self, now: Instant) {
+        let Some(words) = self.attitude.as_ref().and_then(Attitude::in_words) else {
+            return;
+        };
+        let until = "until camera_mount_* or nominal_* are corrected, or max_attitude_deviation_deg allows it";
+        let consequence = if self.holds_outputs {
+            "receptacle and the outputs to flight stacks are held back"
+        } else {
+            "this lasts"
+        };
+        let words = format!("{words}; {consequence} {until}");
+        self.faults.see(Fault::UnexpectedAttitude, &words, now);
     }
 
     fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
