@@ -19,7 +19,7 @@ impl Pipeline {
     /// Returns the residuals of a frame's detections about its best fit, trusted or not; none without a fit.
     #[must_use]
     pub fn residuals(&self, frame: &DetectionFrame, outcome: &FrameOutcome) -> Vec<MarkerResidual> {
-        let (Some(solution), Ok((camera, observations))) =
+        let (Some(solution), Ok((camera, observations, _))) =
             (outcome.solution(), self.observations(frame))
         else {
             return Vec::new();
