@@ -61,7 +61,7 @@ fn cut(word: &str, most: usize) -> String {
         }
     }
     if end.is_some() {
-        text += &format!("… ({} bytes)", word.len());
+        return format!("{text}… ({} bytes)", word.len());
     }
     text
 }

@@ -360,7 +360,7 @@ pub const TABLE: &[ParameterSpec] = &[
             max: 1000,
         },
         read_only: false,
-        description: "fewest detections of similar sigma for a pose; with 4, small errors of one pass unseen, with 3 all do",
+        description: "fewest detections of similar sigma for a pose; with 4, small errors in one detection go unnoticed; with 3, all do",
     },
     ParameterSpec {
         name: "trust_probability",

@@ -45,8 +45,9 @@ pub fn mismatch(ros_distro: &str) -> Option<String> {
     }
     let feature = if is_old { "humble" } else { "jazzy" };
     Some(format!(
-        "ROS_DISTRO is {ros_distro:?}, but this build is for {}: topics work, but nodes do not see each other by \
+        "ROS_DISTRO is {}, but this build is for {}: topics work, but nodes do not see each other by \
          name; build with --no-default-features --features {feature}",
+        crate::text::quoted(ros_distro),
         built_for()
     ))
 }

@@ -11,7 +11,7 @@ use super::convert;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
 use super::health::{
-    Doubtful, Fault, ImageAge, Second, SystemClock, Watch, both_clocks, seconds_between,
+    Fault, ImageAge, Second, SystemClock, Watch, both_clocks, fault_of, seconds_between,
 };
 use super::input::{InputMessage, InputReader};
 use super::messages::{
@@ -80,7 +80,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// Takes what was read anew since they were opened. Which of them there are is fixed, and so are their names.
+    /// Applies reloaded settings; the outputs and their names stay fixed.
     pub(super) fn configure(
         &mut self,
         configuration: &Configuration,
@@ -208,13 +208,16 @@ impl Estimator {
             .pipeline
             .camera_for(frame.stamp, &frame.frame_id)
             .is_ok();
-        if is_of_camera && !is_frame_mismatch(outcome.result.as_ref().err(), &frame.frame_id) {
+        let refusal = outcome.result.as_ref().err();
+        let fault = refusal.and_then(|refusal| fault_of(refusal, &frame.frame_id));
+        if is_of_camera && fault != Some(Fault::FrameMismatch) {
             self.watch.on_image(header.stamp, begin);
             if let Some(image) = self.age_of(header.stamp) {
                 self.watch.on_age(image, begin);
             }
         }
-        self.watch_fit(&frame, &outcome, begin);
+        self.watch
+            .on_outcome(&self.pipeline, &frame, &outcome, begin);
         if let Ok(solution) = &outcome.result {
             let excluded = &solution.excluded;
             let ids = frame.detections.iter().map(|seen| seen.id);
@@ -292,23 +295,6 @@ impl Estimator {
         })
     }
 
-    /// Lets the watch see how the fit of a frame is judged by its residuals, if it has one.
-    fn watch_fit(&mut self, frame: &DetectionFrame, outcome: &FrameOutcome, now: Instant) {
-        match (outcome.code(), outcome.solution()) {
-            (OutcomeCode::NotTrusted, Some(solution)) => {
-                let residuals = self.pipeline.residuals(frame, outcome);
-                let doubtful = Doubtful {
-                    chi_squared: solution.chi_squared,
-                    degrees_of_freedom: solution.degrees_of_freedom,
-                    residuals: &residuals,
-                };
-                self.watch.on_fit(Some(doubtful), now);
-            }
-            (_, Some(_)) => self.watch.on_fit(None, now),
-            _ => {}
-        }
-    }
-
     /// Takes a sample of the receiver's attitude.
     pub fn on_attitude(&mut self, message: &AttitudeMessage) {
         self.watch.on_decoded(ATTITUDE);
@@ -363,7 +349,7 @@ impl Estimator {
     pub fn on_reset(&mut self) {
         self.pipeline.reset();
         self.watch.on_reset();
-        log::info!("track and last attitude are forgotten, as asked by ~/reset");
+        log::info!("track and last attitude were reset by a call of ~/reset");
     }
 
     /// Takes note of a sample on `topic` that could not be decoded.
@@ -487,7 +473,7 @@ impl Estimator {
         };
         if let CameraState::Invalid { reason } = &state {
             if self.bad_camera.fault((), Instant::now()) {
-                log::warn!("this camera info cannot be used: {reason}");
+                log::warn!("the camera info cannot be used: {reason}");
             }
         } else {
             let recovered = self.bad_camera.good().is_some();
@@ -528,59 +514,15 @@ impl Estimator {
         let now = Instant::now();
         let (sec, nanosec) = (frame.stamp.sec, frame.stamp.nanosec);
         let words = format!(
-            "refused from {sec}.{nanosec:09} on, {}: {message}",
+            "frames are refused from stamp {sec}.{nanosec:09} on, {}: {message}",
             outcome.name()
         );
         let is_new = self.refusals.fault(outcome, now);
-        let is_fault = match outcome {
-            OutcomeCode::NoCameraInfo => Some(Fault::NoCameraInfo),
-            _ if is_frame_mismatch(answer.result.as_ref().err(), &frame.frame_id) => {
-                Some(Fault::FrameMismatch)
-            }
-            _ => None,
-        };
-        match is_fault {
+        let refusal = answer.result.as_ref().err();
+        match refusal.and_then(|refusal| fault_of(refusal, &frame.frame_id)) {
             Some(fault) => self.watch.on_refusal(fault, &words, now),
             None if is_new => log::warn!("{words}"),
             None => {}
-        }
-    }
-}
-
-/// Whether a frame was refused because something in it names another camera's frame. A detection of another time is
-/// no such thing, though its outcome has the same code.
-fn is_frame_mismatch(refusal: Option<&Refusal>, frame_id: &str) -> bool {
-    match refusal {
-        Some(Refusal::FrameMismatch { .. } | Refusal::FrameIdTooLong { .. }) => true,
-        Some(Refusal::OtherImage { frame_id: own, .. }) => !own.is_empty() && own != frame_id,
-        _ => false,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pipeline::Stamp;
-
-    #[test]
-    fn detection_of_another_time_names_no_other_frame() {
-        let other = |frame_id: &str| Refusal::OtherImage {
-            id: 1,
-            stamp: Stamp { sec: 1, nanosec: 2 },
-            frame_id: frame_id.to_owned(),
-        };
-        for (refusal, expected) in [
-            (None, false),
-            (Some(other("camera")), false),
-            (Some(other("")), false),
-            (Some(other("another")), true),
-            (Some(Refusal::NoCameraInfo), false),
-        ] {
-            assert_eq!(
-                is_frame_mismatch(refusal.as_ref(), "camera"),
-                expected,
-                "{refusal:?}"
-            );
         }
     }
 }

@@ -6,6 +6,8 @@
 use ros2_client::{Name, NodeName};
 use ros2args::{RemapRule, Ros2ArgsError};
 
+use crate::text::{line, quoted};
+
 /// A node's own name with the rules that rename its topics.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NodeNames {
@@ -22,7 +24,7 @@ pub enum NamesError {
     #[error("{0}")]
     Invalid(Ros2ArgsError),
     /// Allowed by ROS, but not by the client library.
-    #[error("{name:?} cannot be used as a name: {reason}")]
+    #[error("{} cannot be used as a name: {}", quoted(name), line(reason))]
     Unsupported {
         /// The expanded name.
         name: String,
@@ -31,7 +33,8 @@ pub enum NamesError {
     },
     /// A remap of something that begins with two underscores and is not known.
     #[error(
-        "cannot remap {from:?}: of the names with two underscores only __node, __name and __ns exist"
+        "cannot remap {}: of the names with two underscores only __node, __name and __ns exist",
+        quoted(from)
     )]
     UnknownSpecial {
         /// Left side of the rule.

@@ -101,8 +101,8 @@ pub enum NodeError {
     Endpoint(#[from] EndpointError),
     /// Nothing can be heard or said any more.
     #[error(
-        "the middleware has ended: its threads do not outlive that the process is stopped and continued \
-         (SIGSTOP, Ctrl-Z, a debugger); start the node again"
+        "the middleware has stopped: its threads do not survive suspending and resuming the process \
+         (SIGSTOP, Ctrl-Z, a debugger); restart the node"
     )]
     MiddlewareGone,
 }

@@ -128,7 +128,9 @@ impl fmt::Display for StartReason {
                 f,
                 "expected a squared innovation of at most {limit:.1}, got {innovation_squared:.1}"
             ),
-            Self::LostPrecision => write!(f, "the covariance was none"),
+            Self::LostPrecision => {
+                write!(f, "the track's covariance was no longer positive definite")
+            }
         }
     }
 }

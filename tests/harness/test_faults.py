@@ -357,13 +357,13 @@ CASES = {
     ),
     "camera without detector": Case(
         "no_detections",
-        "/camera_info comes, but no publisher of /feature_points fits",
+        "camera info comes on /camera_info, but /feature_points has no publisher of the right type",
         lambda scene: scene.speak("/camera_info"),
         lambda scene: scene.speak("/feature_points"),
     ),
     "detector gone": Case(
         "no_detections",
-        "have stopped",
+        "nothing comes on /feature_points any more",
         stop_detector,
         lambda scene: scene.speak("/feature_points"),
     ),
@@ -375,7 +375,7 @@ CASES = {
     ),
     "camera stops": Case(
         "stale_camera_info",
-        "/camera_info came steadily",
+        "no camera info on /camera_info for 5 s",
         stop_camera,
         lambda scene: scene.speak("/camera_info"),
     ),
@@ -431,7 +431,7 @@ CASES = {
     "clock goes far ahead": Case("clock_jump", "ahead by", turn_clock(5000), nothing, SIM_TIME),
     "detector of another definition": Case(
         "undecodable",
-        "a sample of feature_points cannot be decoded",
+        "a message on feature_points cannot be decoded",
         send_undecodable,
         send_good,
     ),

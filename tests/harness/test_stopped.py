@@ -23,5 +23,5 @@ def test_the_node_ends_with_the_reason_when_the_middleware_has_ended(
     process.send(signal.SIGCONT)
 
     assert process.wait() != 0
-    assert "the middleware has ended" in process.log
+    assert "the middleware has stopped" in process.log
     assert "panicked" not in process.log

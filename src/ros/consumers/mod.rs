@@ -130,8 +130,8 @@ impl Consumers {
         }))
     }
 
-    /// Takes the setup as it is now, with the mount as it is now: a lever arm of yesterday would give a wrong
-    /// place that looks right. Attitudes and counts begin anew, as all does that a clean-up forgets.
+    /// Reloads setup and mount: a stale lever arm gives a plausible but wrong position. Attitudes and counts start again,
+    /// like everything that a clean-up forgets.
     pub fn configure(&mut self, configuration: &ConsumerConfiguration, setup: RefuellingSetup) {
         self.setup = setup;
         self.on_configuration(configuration);

@@ -19,9 +19,11 @@ pub(super) enum Silence {
     Attitude(#[from] AttitudeError),
     #[error(transparent)]
     FlightStack(#[from] FlightStackError),
-    #[error("the frame has not corrected a track, which needs a few consistent frames")]
+    #[error(
+        "the track is not confirmed yet, or this frame did not fit it: it needs a few consistent frames"
+    )]
     NoTrack,
-    #[error("there is no probability for this covariance")]
+    #[error("the covariance of the position gives no probability")]
     NoProbability,
     #[error(
         "the tanker stands {:.1}° off its nominal attitude, or did within the last seconds, expected are {}° at most: \

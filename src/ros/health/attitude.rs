@@ -155,14 +155,14 @@ mod tests {
         UnitQuaternion::from_scaled_axis(axis * deg.to_radians())
     }
 
-    /// Takes poses for some seconds; returns the time after them.
+    /// Takes poses for some tenths of a second; returns the time after them.
     fn pass(
         attitude: &mut Attitude,
         start: Instant,
-        seconds: f64,
+        tenths: u32,
         mut pose: impl FnMut(u32) -> UnitQuaternion<f64>,
     ) -> Instant {
-        let frames = (seconds / FRAME.as_secs_f64()).round() as u32;
+        let frames = 2 * tenths;
         for frame in 0..frames {
             attitude.take(&pose(frame), start + frame * FRAME);
         }
@@ -176,11 +176,11 @@ mod tests {
         let mut attitude = Attitude::new(expected(pitched(-14.0)));
         let level = seen(truth, UnitQuaternion::identity());
         let start = Instant::now();
-        let now = pass(&mut attitude, start, 2.9, |_| level);
+        let now = pass(&mut attitude, start, 29, |_| level);
         let held = attitude.unexpected().expect("held from the first on");
         assert!((held.off_deg - 28.0).abs() < 1e-6);
         assert_eq!(attitude.in_words(), None);
-        let now = pass(&mut attitude, now, 0.2, |_| level);
+        let now = pass(&mut attitude, now, 2, |_| level);
         let words = attitude.in_words().expect("3 s");
         assert!(
             words.contains("camera_mount_pitch_deg: 14 instead of -14"),
@@ -190,7 +190,7 @@ mod tests {
         assert!(!attitude.expect(&expected(pitched(-14.0))));
         assert!(attitude.in_words().is_some());
         assert!(attitude.expect(&expected(truth)));
-        pass(&mut attitude, now, 0.1, |_| level);
+        pass(&mut attitude, now, 1, |_| level);
         assert_eq!((attitude.unexpected(), attitude.in_words()), (None, None));
     }
 
@@ -198,16 +198,16 @@ mod tests {
     fn manoeuvre_that_passes_and_noise_about_a_good_attitude_are_no_fault() {
         let mount = pitched(14.0);
         let mut attitude = Attitude::new(expected(mount));
-        let now = pass(&mut attitude, Instant::now(), 2.5, |_| {
+        let now = pass(&mut attitude, Instant::now(), 25, |_| {
             seen(mount, turned(Vector3::x(), 25.0))
         });
         assert!(attitude.unexpected().is_some() && attitude.in_words().is_none());
-        let now = pass(&mut attitude, now, 2.0, |_| {
+        let now = pass(&mut attitude, now, 20, |_| {
             seen(mount, UnitQuaternion::identity())
         });
         assert_eq!(attitude.unexpected(), None);
         // Far away: 20° to either side, frame by frame.
-        pass(&mut attitude, now, 20.0, |frame| {
+        pass(&mut attitude, now, 200, |frame| {
             let deg = if frame % 2 == 0 { 20.0 } else { -20.0 };
             seen(mount, turned(Vector3::y(), deg))
         });
@@ -222,7 +222,7 @@ mod tests {
         };
         let mut attitude = Attitude::new(expected(Angles::default()));
         // A little more and a little less than half a turn: its axis changes sides.
-        pass(&mut attitude, Instant::now(), 4.0, |frame| {
+        pass(&mut attitude, Instant::now(), 40, |frame| {
             let deg = if frame % 2 == 0 { 0.5 } else { -0.5 };
             seen(mount, turned(Vector3::x(), deg))
         });
@@ -235,12 +235,12 @@ mod tests {
         let mount = pitched(14.0);
         let mut attitude = Attitude::new(expected(mount));
         let off = seen(mount, turned(Vector3::z(), 20.0));
-        let now = pass(&mut attitude, Instant::now(), 4.0, |_| off);
+        let now = pass(&mut attitude, Instant::now(), 40, |_| off);
         assert!(attitude.in_words().is_some());
         let good = seen(mount, UnitQuaternion::identity());
-        let now = pass(&mut attitude, now + 100 * LASTING, 2.5, |_| good);
+        let now = pass(&mut attitude, now + 100 * LASTING, 25, |_| good);
         assert!(attitude.in_words().is_some() && attitude.unexpected().is_some());
-        pass(&mut attitude, now, 1.0, |_| good);
+        pass(&mut attitude, now, 10, |_| good);
         assert_eq!((attitude.unexpected(), attitude.in_words()), (None, None));
     }
 }

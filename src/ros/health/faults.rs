@@ -1,4 +1,4 @@
-//! Faults that last: each is said once when it begins and once when it ends.
+//! Lasting faults: each is logged once when it begins and once when it ends.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

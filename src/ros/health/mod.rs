@@ -1,5 +1,4 @@
-//! What is wrong with the node's surroundings: noticed, said when it begins and when it ends, and shown in
-//! `/diagnostics` in between.
+//! Detects what is wrong around the node, logs when it begins and ends, and shows it in `/diagnostics` in between.
 //!
 //! `watch` notices, `faults` remembers and says. `jump` and `stamp_age` judge stamps, `suspects` markers, `residuals`
 //! frames that are not trusted, `attitude` mount and nominal attitude, `system_clock` the system's time; `latency` keeps
@@ -9,6 +8,7 @@ mod attitude;
 mod faults;
 mod jump;
 mod latency;
+mod refusals;
 mod residuals;
 mod stamp_age;
 mod suspects;
@@ -19,6 +19,7 @@ pub use attitude::{Attitude, Unexpected};
 pub use faults::{Fault, Faults};
 pub use jump::{Jumps, seconds_between};
 pub use latency::{Latency, WINDOW_S};
+pub use refusals::fault_of;
 pub use residuals::{Doubtful, Residuals};
 pub use stamp_age::{ImageAge, StampAge};
 pub use suspects::Suspects;

@@ -225,7 +225,8 @@ mod tests {
         let mut residuals = Residuals::default();
         let start = Instant::now();
         let off = |frame: u32| {
-            (frame % 4 != 0).then(|| vec![at(1, 0.2, 0.1), at(3, -2.0, 0.5), at(4, 0.5, -0.4)])
+            (!frame.is_multiple_of(4))
+                .then(|| vec![at(1, 0.2, 0.1), at(3, -2.0, 0.5), at(4, 0.5, -0.4)])
         };
         assert_eq!(
             pass(&mut residuals, start, 60, off),
@@ -233,10 +234,8 @@ mod tests {
             "3 s have not passed"
         );
         let words = pass(&mut residuals, start + 60 * FRAME, 40, off).expect("5 s");
-        assert!(
-            words.starts_with("75% of the frames") || words.starts_with("74%"),
-            "{words}"
-        );
+        // Three of four; the latest weigh most.
+        assert!(words.starts_with("76% of the frames"), "{words}");
         assert!(
             words.contains("the marker map or the calibration"),
             "{words}"
@@ -267,7 +266,7 @@ mod tests {
 
     #[test]
     fn few_frames_among_many_are_wrong_detections() {
-        let wrong = |frame: u32| (frame % 10 == 0).then(|| vec![at(1, 30.0, 0.0)]);
+        let wrong = |frame: u32| (frame.is_multiple_of(10)).then(|| vec![at(1, 30.0, 0.0)]);
         let mut residuals = Residuals::default();
         assert_eq!(pass(&mut residuals, Instant::now(), 1000, wrong), None);
     }

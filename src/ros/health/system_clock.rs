@@ -1,4 +1,4 @@
-//! The system's clock, set back: for as long the middleware hands over nothing.
+//! Detects backward steps of the system clock, which silence best-effort inputs.
 //!
 //! `RustDDS` files samples by the time at which they come, and hands a best-effort input those up to now. What came
 //! before the clock was set back lies in its future, and so does all that comes until the clock has caught up.
@@ -31,8 +31,8 @@ impl SystemClock {
         let (step, until) = self.set_back?;
         match until.duration_since(system) {
             Ok(left) if !left.is_zero() => Some(format!(
-                "the system's clock was set back by {:.3} s: best-effort inputs are deaf for another {:.0} s, \
-                 unless the node is restarted",
+                "the system's clock was set back by {:.3} s: best-effort inputs (the default) receive nothing for another {:.0} s; \
+                 restart the node to receive at once",
                 step.as_secs_f64(),
                 left.as_secs_f64().ceil()
             )),

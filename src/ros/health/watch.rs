@@ -9,6 +9,7 @@ use super::{
     Attitude, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge, Suspects,
     Unexpected,
 };
+use crate::pipeline::{DetectionFrame, FrameOutcome, OutcomeCode, Pipeline};
 use crate::refuelling::ExpectedAttitude;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
@@ -19,7 +20,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 const STEADY_S: u32 = 3;
 /// How long detections may come before the camera info does, at a start.
 const GRACE: Duration = Duration::from_secs(2);
-/// Without detections and publishers of them for so long, that is said.
+/// Missing detections are logged after this long.
 const WAIT: Duration = Duration::from_secs(3);
 /// Most ends of others that are named; a strange graph may have any number.
 const MOST_MISFITS: usize = 16;
@@ -31,7 +32,7 @@ struct Arrivals {
     this_second: bool,
     steady_s: u32,
     was_steady: bool,
-    /// Since when there is somebody to hear.
+    /// Since when the topic has had a publisher that fits.
     heard_since: Option<Instant>,
 }
 
@@ -70,7 +71,7 @@ impl Arrivals {
         self.last.is_some_and(|last| !is_long(last, now))
     }
 
-    /// Whether there is somebody to hear, for a while, and nothing comes.
+    /// Whether the topic has had a publisher for a while, and nothing comes.
     fn silent(&self, now: Instant) -> bool {
         self.heard_since.is_some_and(|since| is_long(since, now)) && !self.recent(now)
     }
@@ -184,8 +185,7 @@ impl Watch {
     /// Takes note of a sample of `topic` that could not.
     pub fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display, now: Instant) {
         let words = format!(
-            "a sample of {topic} cannot be decoded, its publisher may be built with another definition of its type: \
-             {error}"
+            "a message on {topic} cannot be decoded, its publisher may be built with another definition of the type: {error}"
         );
         self.faults.see_of(Fault::Undecodable, topic, &words, now);
     }
@@ -194,8 +194,8 @@ impl Watch {
     pub fn on_lost(&mut self, topic: &str, count: u64, now: Instant) {
         if count > 0 {
             let words = format!(
-                "{count} sample(s) of {topic} were passed over within a second: the node could not run, or they come \
-                 faster than it takes them"
+                "{count} message(s) on {topic} were skipped within a second for newer ones: the node was held up, or they come \
+                 faster than it can answer"
             );
             self.faults.see_of(Fault::LostInput, topic, &words, now);
         }
@@ -233,9 +233,27 @@ impl Watch {
         attitude.unexpected()
     }
 
-    /// Takes note of a fit: a trusted one, or one that is not, with its residuals.
-    pub fn on_fit(&mut self, doubtful: Option<Doubtful>, now: Instant) {
-        self.residuals.take(doubtful, now);
+    /// Takes note of how the fit of a frame is judged by its residuals, if it has one.
+    pub fn on_outcome(
+        &mut self,
+        pipeline: &Pipeline,
+        frame: &DetectionFrame,
+        outcome: &FrameOutcome,
+        now: Instant,
+    ) {
+        let Some(solution) = outcome.solution() else {
+            return;
+        };
+        if outcome.code() == OutcomeCode::NotTrusted {
+            let doubtful = Doubtful {
+                chi_squared: solution.chi_squared,
+                degrees_of_freedom: solution.degrees_of_freedom,
+                residuals: &pipeline.residuals(frame, outcome),
+            };
+            self.residuals.take(Some(doubtful), now);
+        } else {
+            self.residuals.take(None, now);
+        }
         match self.residuals.in_words() {
             Some(words) => self.faults.see(Fault::NotTrusted, &words, now),
             None => self.faults.end(Fault::NotTrusted),
@@ -259,7 +277,9 @@ impl Watch {
         self.faults.end(Fault::FrameMismatch);
         if let Some(jump) = self.stamps.take(stamp, now) {
             let topic = &self.detections_topic;
-            let words = format!("stamps of {topic} went {jump}");
+            let words = format!(
+                "stamps of {topic} went {jump}: two sources in turn, a clock that was set, or a recording that begins anew"
+            );
             self.faults.see(Fault::StampJump, &words, now);
         }
     }
@@ -301,7 +321,8 @@ impl Watch {
         let (camera, detections) = (&self.camera_topic, &self.detections_topic);
         let publishers = self.cameras;
         format!(
-            "{detections} come, but nothing has come on {camera} ({publishers} publisher(s) fit): {refusal}"
+            "detections come on {detections}, but no camera info has come on {camera}, which has {publishers} publisher(s) of the \
+             right type and QoS: {refusal}"
         )
     }
 
@@ -333,7 +354,7 @@ impl Watch {
         }
         self.watch_clock(second.clock_jump, second.clock_silence, now);
         for (topic, reason) in second.dropped {
-            let words = format!("not all is published on {topic}: {reason}");
+            let words = format!("dropping messages on {topic}: {reason}");
             self.faults
                 .see_of(Fault::DroppedOutput, &topic, &words, now);
         }
@@ -345,7 +366,7 @@ impl Watch {
         let silence_s = SILENCE.as_secs();
         let silent = |topic: &str, publishers: usize| {
             format!(
-                "nothing of {topic} has come for {silence_s} s, though {publishers} publisher(s) fit"
+                "nothing has come on {topic} for {silence_s} s, though it has {publishers} publisher(s) of the right type and QoS"
             )
         };
         if self.detections.silent(now) {
@@ -365,31 +386,32 @@ impl Watch {
             let ever = self.detections.ever();
             if ever || (self.camera.recent(now) && is_long(self.begin, now)) {
                 let words = if ever {
-                    format!("{detections} have stopped: their publisher is gone")
+                    format!("nothing comes on {detections} any more: its publisher has left")
                 } else {
-                    format!("{camera} comes, but no publisher of {detections} fits")
+                    format!(
+                        "camera info comes on {camera}, but {detections} has no publisher of the right type and QoS"
+                    )
                 };
                 self.faults.see(Fault::NoDetections, &words, now);
             }
         }
         if self.camera.was_steady && !self.camera.recent(now) && self.detections.recent(now) {
             let words = format!(
-                "{camera} came steadily, but not for {silence_s} s now, while detections do ({cameras} publisher(s)): \
-                 the last one still counts"
+                "no camera info on {camera} for {silence_s} s, where it came steadily before ({cameras} publisher(s) now), while \
+                 detections go on: the last one is still used"
             );
             self.faults.see(Fault::StaleCameraInfo, &words, now);
         }
         if self.detections.ever() {
             if std::mem::take(&mut self.waiting_said) {
-                log::info!("{detections} arrive");
+                log::info!("detections have begun to come on {detections}");
             }
         } else if detectors == 0
             && !self.waiting_said
             && now.saturating_duration_since(self.begin) >= WAIT
         {
             self.waiting_said = true;
-            let topic = detections.trim_start_matches('/');
-            log::info!("waiting for {topic}: nobody publishes them yet");
+            log::info!("waiting for detections: {detections} has no publisher yet");
         }
     }
 
@@ -409,7 +431,9 @@ impl Watch {
 
     fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
         if let Some(jump) = jump {
-            let words = format!("/clock went {jump}");
+            let words = format!(
+                "/clock went {jump}: a simulation or recording that begins anew or leaps, or two of them at once"
+            );
             self.faults.see(Fault::ClockJump, &words, now);
         }
         if let Some(silence) = silence.filter(|silence| is_long(silence.since, now)) {
