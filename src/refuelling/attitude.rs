@@ -133,9 +133,7 @@ impl ExpectedAttitude {
             self.mount.rotation().inverse() * turn * self.nominal.rotation();
         let left_deg = |cause: &Cause| {
             let found = cause.mount.rotation() * camera_body_from_tanker;
-            (cause.nominal.rotation().inverse() * found)
-                .angle()
-                .to_degrees()
+            angle_deg(&(cause.nominal.rotation().inverse() * found))
         };
         let mut causes: Vec<(f64, Cause)> = self
             .causes()
@@ -227,6 +225,13 @@ impl ExpectedAttitude {
         }
         causes
     }
+}
+
+/// Returns how far a rotation turns. By its quaternion: of no turn the matrix's trace may give NaN.
+pub(super) fn angle_deg(rotation: &Rotation3<f64>) -> f64 {
+    UnitQuaternion::from_rotation_matrix(rotation)
+        .angle()
+        .to_degrees()
 }
 
 fn has_sign(angle_deg: f64) -> bool {
@@ -336,14 +341,20 @@ mod tests {
         let (_, words) = found(&told, &truth, truth.nominal);
         assert!(words.contains("given the other way round"), "{words}");
 
-        let truth = expected(angles(180.0, 5.0, 0.0), Angles::default());
-        let told = expected(angles(0.0, 5.0, 0.0), Angles::default());
-        let (off_deg, words) = found(&told, &truth, truth.nominal);
-        assert!((off_deg - 180.0).abs() < 1e-4, "{off_deg}");
-        assert!(
-            words.contains("camera_mount_roll_deg -180 instead of 0"),
-            "{words}"
-        );
+        for (mount, nominal) in [
+            (angles(0.0, 5.0, 0.0), Angles::default()),
+            // What is left comes to nothing here, and its cosine to more than one.
+            (Angles::default(), angles(-8.5, 9.5, 9.0)),
+        ] {
+            let truth = expected(mount.with(0, 180.0), nominal);
+            let told = expected(mount, nominal);
+            let (off_deg, words) = found(&told, &truth, truth.nominal);
+            assert!((off_deg - 180.0).abs() < 1e-4, "{off_deg}");
+            assert!(
+                words.contains("camera_mount_roll_deg -180 instead of 0"),
+                "{words}"
+            );
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::attitude::angle_deg;
 use super::{ExpectedAttitude, RefuellingGeometry};
 
 /// deg; a camera that looks further away from straight ahead sees no tanker there.
@@ -116,7 +117,7 @@ impl Understood {
             "nominal attitude: the tanker flies {flies}, up to {}° off that",
             expected.limit_deg
         ));
-        let turn_deg = nominal.rotation().angle().to_degrees();
+        let turn_deg = angle_deg(&nominal.rotation());
         if turn_deg > MOST_NOMINAL_DEG {
             self.warnings.push(format!(
                 "the nominal attitude is {turn_deg:.0}° from parallel flight, expected are {MOST_NOMINAL_DEG}° at most: \

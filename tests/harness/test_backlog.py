@@ -172,7 +172,7 @@ def test_after_a_pause_only_the_newest_frames_are_answered_and_the_others_counte
     assert answered(node.estimator, stamps) == stamps[-depth:]
     lost = BURST - depth
     peer.spin_until(lambda: int(value("lost")) == before + lost, f"{lost} more lost frames")
-    words = f"lost_input: {lost} sample(s) of feature_points"
+    words = f"lost_input: {lost} message(s) on feature_points"
     peer.spin_until(lambda: words in node.log, "the loss in the log")
     over = node.log.count("lost_input is over")
     peer.spin_until(lambda: value("lost_input") == "", "the end of the fault")
