@@ -52,7 +52,7 @@ fn check(spec: &ParameterSpec, value: ParameterValue) -> Result<ParameterValue, 
         (Kind::FrameId { .. }, String(value)) => require(name, value, FRAME_ID, |text| {
             !text.is_empty()
                 && !text.starts_with('/')
-                && !text.contains(char::is_whitespace)
+                && !text.contains(|letter: char| letter.is_whitespace() || letter.is_control())
                 && text.len() <= MAX_NAME_BYTES
         }),
         (kind, value) => Err(ParameterError::WrongType {

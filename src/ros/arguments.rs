@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use log::LevelFilter;
-use ros2args::{LogLevel, RemapRule, Ros2Args, Ros2ArgsError};
+use ros2args::{RemapRule, Ros2Args, Ros2ArgsError};
 
-use super::parameter_file;
-use crate::config::ParameterValue;
+use super::rules::{self, Assignment};
 use crate::text::clip;
 
 /// What `--help` prints.
@@ -19,7 +18,7 @@ ROS arguments:
   -p, --param name:=value        set a parameter (node:name:=value: for that node only)
       --params-file FILE         set parameters from a YAML file
   -r, --remap from:=to           rename a topic; __node:=name and __ns:=/namespace rename the node
-      --log-level LEVEL          debug, info, warn, error or fatal (logger:=LEVEL: for that logger only)
+      --log-level LEVEL          debug, info, warn, error, fatal or unset (logger:=LEVEL: for that logger only)
       --disable-rosout-logs      do not publish log messages to /rosout
       --disable-stdout-logs      do not print log messages
   -e, --enclave PATH             accepted; this build has no DDS security
@@ -59,17 +58,6 @@ pub enum ParameterSource {
     Assignment(Assignment),
 }
 
-/// `-p node:name:=value`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Assignment {
-    /// Base name of the node; none: every node.
-    pub node: Option<String>,
-    /// The parameter.
-    pub name: String,
-    /// None where something stands that no parameter can hold.
-    pub value: Option<ParameterValue>,
-}
-
 impl Default for Arguments {
     /// Returns what an empty command line says.
     fn default() -> Self {
@@ -101,14 +89,13 @@ pub enum ArgumentError {
     /// A malformed ROS argument.
     #[error("{0}")]
     Ros(#[from] Ros2ArgsError),
-    /// A `-p` that is no assignment.
-    #[error(
-        "argument -p {}: {reason}; expected name:=value or node:name:=value",
-        clip(argument)
-    )]
-    Assignment {
-        /// What came.
-        argument: String,
+    /// A value that ROS does not know.
+    #[error("argument {argument} {}: {reason}", clip(value))]
+    Value {
+        /// The argument.
+        argument: &'static str,
+        /// What came behind it.
+        value: String,
         /// What is wrong with it.
         reason: String,
     },
@@ -163,128 +150,121 @@ impl Arguments {
     /// # Errors
     /// [`ArgumentError`] when a ROS argument is malformed or not supported.
     pub fn split(arguments: &[String]) -> Result<(Self, Vec<String>), ArgumentError> {
-        let (rest, parameters) = take_parameters(arguments)?;
+        let mut found = Self::default();
+        let rest = found.take(arguments)?;
         let (ros, others) = ros2args::parse_ros2_args(&rest)?;
-        Ok((Self::from_ros(ros, parameters)?, others))
+        found.take_switches(ros)?;
+        Ok((found, others))
     }
 
-    fn from_ros(ros: Ros2Args, parameters: Vec<ParameterSource>) -> Result<Self, ArgumentError> {
+    /// Returns the arguments without those that have a value with a grammar of its own, which it keeps: the parser would
+    /// part files from assignments, read values by other rules than rcl, and pass over rules that are for nobody.
+    ///
+    /// Also drops `--log-file-name`, which ROS accepts and the parser does not: the node writes no log file.
+    fn take(&mut self, arguments: &[String]) -> Result<Vec<String>, ArgumentError> {
+        let mut rest = Vec::new();
+        let mut in_ros_arguments = false;
+        let mut arguments = arguments.iter();
+        while let Some(argument) = arguments.next() {
+            match argument.as_str() {
+                "--ros-args" => in_ros_arguments = true,
+                "--" => in_ros_arguments = false,
+                _ => {}
+            }
+            let kind = ValueKind::of(argument).filter(|_| in_ros_arguments);
+            let Some(kind) = kind else {
+                rest.push(argument.clone());
+                continue;
+            };
+            let value = arguments.next().ok_or_else(|| ArgumentError::NoValue {
+                argument: argument.clone(),
+            })?;
+            self.keep(kind, value)
+                .map_err(|(argument, reason)| ArgumentError::Value {
+                    argument,
+                    value: value.clone(),
+                    reason,
+                })?;
+        }
+        Ok(rest)
+    }
+
+    fn keep(&mut self, kind: ValueKind, value: &str) -> Result<(), (&'static str, String)> {
+        match kind {
+            ValueKind::Parameter => {
+                let expected = "; expected name:=value or node:name:=value";
+                let given = rules::assignment(value).map_err(|fault| ("-p", fault + expected))?;
+                self.parameters.push(ParameterSource::Assignment(given));
+            }
+            ValueKind::ParameterFile => {
+                self.parameters
+                    .push(ParameterSource::File(PathBuf::from(value)));
+            }
+            ValueKind::Remap => {
+                let expected = "; expected from:=to or node:from:=to";
+                let rule = rules::remap(value).map_err(|fault| ("-r", fault + expected))?;
+                self.remaps.push(rule);
+            }
+            ValueKind::LogLevel => {
+                let (logger, level) =
+                    rules::log_level(value).map_err(|fault| ("--log-level", fault))?;
+                self.log_levels
+                    .retain(|(known, _)| known.as_deref() != logger);
+                let logger = logger.map(str::to_owned);
+                self.log_levels.extend(level.map(|level| (logger, level)));
+            }
+            ValueKind::LogFileName => {}
+        }
+        Ok(())
+    }
+
+    fn take_switches(&mut self, ros: Ros2Args) -> Result<(), ArgumentError> {
         if ros.log_config_file.is_some() {
             return Err(ArgumentError::Unsupported {
                 argument: "--log-config-file",
                 instead: "use --log-level, or RUST_LOG for finer filters",
             });
         }
-        let log_levels = ros
-            .log_levels
-            .into_iter()
-            .map(|assignment| (assignment.logger_name, filter(assignment.level)))
-            .collect();
-        Ok(Self {
-            remaps: ros.remap_rules,
-            parameters,
-            log_levels,
-            rosout_logs: ros.logging_output.rosout.unwrap_or(true),
-            console_logs: ros.logging_output.stdout.unwrap_or(true),
+        if let Some(value) = ros.enclave.filter(|path| !rules::is_enclave(path)) {
+            return Err(ArgumentError::Value {
+                argument: "--enclave",
+                value,
+                reason: "expected names with slashes before them, as in /left/camera".to_owned(),
+            });
+        }
+        self.rosout_logs = ros.logging_output.rosout.unwrap_or(true);
+        self.console_logs = ros.logging_output.stdout.unwrap_or(true);
+        Ok(())
+    }
+}
+
+/// Arguments with a value that is read here.
+#[derive(Debug, Clone, Copy)]
+enum ValueKind {
+    Parameter,
+    ParameterFile,
+    Remap,
+    LogLevel,
+    LogFileName,
+}
+
+impl ValueKind {
+    fn of(argument: &str) -> Option<Self> {
+        Some(match argument {
+            "-p" | "--param" => Self::Parameter,
+            "--params-file" => Self::ParameterFile,
+            "-r" | "--remap" => Self::Remap,
+            "--log-level" => Self::LogLevel,
+            "--log-file-name" => Self::LogFileName,
+            _ => return None,
         })
-    }
-}
-
-/// Returns the arguments without those that give values to parameters, and these in their order: the parser would part
-/// files from assignments, and read values by other rules than rcl.
-///
-/// Also takes away what ROS accepts and the parser does not: `--log-file-name` (the node writes no log file) and the
-/// level `UNSET`, which leaves levels as they are.
-fn take_parameters(
-    arguments: &[String],
-) -> Result<(Vec<String>, Vec<ParameterSource>), ArgumentError> {
-    let (mut rest, mut sources) = (Vec::new(), Vec::new());
-    let mut in_ros_arguments = false;
-    let mut arguments = arguments.iter();
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--ros-args" => in_ros_arguments = true,
-            "--" => in_ros_arguments = false,
-            _ => {}
-        }
-        let takes_value = matches!(
-            argument.as_str(),
-            "-p" | "--param" | "--params-file" | "--log-file-name" | "--log-level"
-        );
-        if !in_ros_arguments || !takes_value {
-            rest.push(argument.clone());
-            continue;
-        }
-        let value = arguments.next().ok_or_else(|| ArgumentError::NoValue {
-            argument: argument.clone(),
-        })?;
-        match argument.as_str() {
-            "-p" | "--param" => sources.push(ParameterSource::Assignment(assignment(value)?)),
-            "--params-file" => sources.push(ParameterSource::File(PathBuf::from(value))),
-            "--log-level" if !is_unset(value) => rest.extend([argument.clone(), value.clone()]),
-            _ => {}
-        }
-    }
-    Ok((rest, sources))
-}
-
-fn is_unset(level: &str) -> bool {
-    let level = level.rsplit_once(":=").map_or(level, |(_, level)| level);
-    level.eq_ignore_ascii_case("unset")
-}
-
-fn assignment(argument: &str) -> Result<Assignment, ArgumentError> {
-    let fault = |reason: String| ArgumentError::Assignment {
-        argument: argument.to_owned(),
-        reason,
-    };
-    let Some((target, word)) = argument.split_once(":=") else {
-        return Err(fault("it has no :=".to_owned()));
-    };
-    let (node, name) = match target.split_once(':') {
-        Some((node, name)) => (Some(node), name),
-        None => (None, target),
-    };
-    if let Some(node) = node.filter(|node| !is_base_name(node)) {
-        return Err(fault(format!(
-            "{:?} is not a node's name without its namespace",
-            clip(node)
-        )));
-    }
-    if name.is_empty() || name.contains(':') {
-        return Err(fault(format!("{:?} is no parameter", clip(name))));
-    }
-    if word.is_empty() {
-        return Err(fault("the value is missing".to_owned()));
-    }
-    let value = parameter_file::value(word).map_err(fault)?;
-    Ok(Assignment {
-        node: node.map(str::to_owned),
-        name: name.to_owned(),
-        value,
-    })
-}
-
-fn is_base_name(name: &str) -> bool {
-    let is_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
-    !name.is_empty()
-        && name.chars().all(is_word)
-        && !name.starts_with(|first: char| first.is_ascii_digit())
-}
-
-/// The `log` crate knows nothing above error.
-const fn filter(level: LogLevel) -> LevelFilter {
-    match level {
-        LogLevel::Debug => LevelFilter::Debug,
-        LogLevel::Info => LevelFilter::Info,
-        LogLevel::Warn => LevelFilter::Warn,
-        LogLevel::Error | LogLevel::Fatal => LevelFilter::Error,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ParameterValue;
 
     fn parse(arguments: &[&str]) -> Result<Command, ArgumentError> {
         let arguments: Vec<_> = arguments
@@ -322,6 +302,10 @@ mod tests {
             "warn",
             "--log-level",
             "rustdds:=debug",
+            "--log-level",
+            "rclrs:=debug",
+            "--log-level",
+            "rclrs:=unset",
             "-e",
             "/enclave",
         ]);
@@ -387,6 +371,8 @@ mod tests {
             &["--ros-args", "-p", "a:=@x"],
             &["--ros-args", "--log-file-name"],
             &["--ros-args", "-r", "a"],
+            &["--ros-args", "-r", "/**:pose:=a"],
+            &["--ros-args", "-e", "left"],
             &["--ros-args", "--log-level", "loud"],
             &["--ros-args", "--bogus"],
             &["--ros-args", "--log-config-file", "x"],

@@ -2,8 +2,10 @@
 //!
 //! ```text
 //! distribution                       which ROS 2 it talks with
-//! arguments, environment, names      what the command line and the variables ask for, checked
-//! parameter_file, start_values       parameters at the start: defaults, files, arguments
+//! arguments, rules                   the command line, and the grammar of one value in it
+//! environment, names                 what variables ask for; the node's and its topics' names after remaps
+//! scalar, parameter_file             what words mean; the sections of a parameter file
+//! overrides, start_values            which value counts for this node; all its parameters at the start
 //! parameters, qos_overrides          parameters while the node runs, behind its services
 //! clock                              the node's time, the system's or a simulation's
 //! participant, leave                 into the graph, and out of it
@@ -50,6 +52,7 @@ pub mod predicted_points;
 pub mod qos_overrides;
 pub mod reset;
 pub mod rtps;
+pub mod rules;
 pub mod running_nodes;
 mod scalar;
 mod serve;

@@ -155,26 +155,15 @@ impl NodeNames {
 
     fn topic_rules(&self) -> impl Iterator<Item = &RemapRule> {
         self.rules.iter().filter(|rule| {
-            let applies = is_topic_scheme(rule) || rule.applies_to_node(&self.base_name);
-            applies && !rule.from.starts_with("__") && !is_service_scheme(rule)
+            let is_for_topics =
+                !rule.from.starts_with("__") && !rule.from.starts_with("rosservice://");
+            is_for_topics && rule.applies_to_node(&self.base_name)
         })
     }
 }
 
-/// `rostopic://name` is a remap of topics only; the argument parser takes the scheme for a node's name.
-fn is_topic_scheme(rule: &RemapRule) -> bool {
-    rule.node_name.as_deref() == Some("rostopic") && rule.from.starts_with("//")
-}
-
-fn is_service_scheme(rule: &RemapRule) -> bool {
-    rule.node_name.as_deref() == Some("rosservice") && rule.from.starts_with("//")
-}
-
 fn topic_side(side: &str) -> &str {
-    side.strip_prefix("rostopic:")
-        .unwrap_or(side)
-        .strip_prefix("//")
-        .unwrap_or(side)
+    side.strip_prefix("rostopic://").unwrap_or(side)
 }
 
 fn is_unknown_special(rule: &RemapRule) -> bool {
@@ -186,10 +175,7 @@ mod tests {
     use super::*;
 
     fn rule(text: &str) -> RemapRule {
-        let arguments = ["--ros-args", "-r", text];
-        let (parsed, _) =
-            ros2args::Ros2Args::from_args(arguments).expect("the rule is well formed");
-        parsed.remap_rules[0].clone()
+        crate::ros::rules::remap(text).expect("the rule is well formed")
     }
 
     fn names(rules: &[&str]) -> NodeNames {
@@ -252,9 +238,15 @@ mod tests {
 
     #[test]
     fn rostopic_rules_rename_topics_and_rosservice_rules_do_not() {
-        let names = names(&["rostopic://pose:=a", "rosservice://status:=b"]);
+        let names = names(&[
+            "rostopic://pose:=a",
+            "rosservice://status:=b",
+            "tanker_pose:rostopic://~/markers:=c",
+            "other:rostopic://status:=d",
+        ]);
         assert_eq!(names.topic("pose").expect("valid"), "/a");
         assert_eq!(names.topic("status").expect("valid"), "/status");
+        assert_eq!(names.topic("~/markers").expect("valid"), "/c");
     }
 
     #[test]
@@ -264,7 +256,6 @@ mod tests {
             "__ns:=/uav1/",
             "__node:=a/b",
             "__node:=1a",
-            "pose:=a//b",
             "__foo:=b",
         ] {
             let refused = NodeNames::new("tanker_pose", &[rule(wrong)]);

@@ -5,6 +5,7 @@
 //! counts, and of the lists that are for a node the later one. So a file's section with the node's name beats `/**` of
 //! the same file, of later files, and of `-p` where `/**` had been seen before.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::arguments::ParameterSource;
@@ -24,6 +25,19 @@ pub struct Override {
     /// Where it stands.
     pub place: Place,
     /// Whether it stands under a file's pattern for several nodes, which may mean others.
+    pub is_shared: bool,
+}
+
+/// A parameter that a file sets again under the same node name or pattern.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repetition {
+    /// The parameter.
+    pub name: String,
+    /// The second place.
+    pub place: Place,
+    /// Line of the first place, from 1.
+    pub first: u64,
+    /// As [`Override::is_shared`].
     pub is_shared: bool,
 }
 
@@ -57,6 +71,8 @@ impl std::fmt::Display for Place {
 pub struct Overrides {
     /// One for each parameter, the one that counts.
     pub values: Vec<Override>,
+    /// What ROS passes over, and nobody would see.
+    pub repetitions: Vec<Repetition>,
     /// Files without a section for this node.
     pub files_without_section: Vec<PathBuf>,
 }
@@ -65,10 +81,10 @@ impl Overrides {
     /// Returns the values that files and arguments give to the node with this absolute name.
     ///
     /// # Errors
-    /// [`ParameterFileError`] of a file that cannot be read, or sets a parameter of this node twice.
+    /// [`ParameterFileError`] of a file that cannot be read, or has values without names for this node.
     pub fn gather(sources: &[ParameterSource], node: &str) -> Result<Self, ParameterFileError> {
         let mut lists: Vec<(String, Vec<Override>)> = Vec::new();
-        let mut files_without_section = Vec::new();
+        let (mut repetitions, mut files_without_section) = (Vec::new(), Vec::new());
         for source in sources {
             match source {
                 ParameterSource::File(path) => {
@@ -77,9 +93,13 @@ impl Overrides {
                     if sections.is_empty() {
                         files_without_section.push(path.clone());
                     }
+                    let mut seen = HashMap::new();
                     for section in sections {
                         section.check(path)?;
-                        append(&mut lists, from_section(section, path));
+                        let written = section.written.clone();
+                        let list = from_section(section, path);
+                        repetitions.extend(repeated(&written, &list, &mut seen));
+                        append(&mut lists, (written, list));
                     }
                 }
                 ParameterSource::Assignment(given) => {
@@ -99,23 +119,32 @@ impl Overrides {
                 }
             }
         }
-        let mut values: Vec<Override> = Vec::new();
-        for given in lists.into_iter().flat_map(|(_, list)| list) {
-            values.retain(|earlier| earlier.name != given.name);
-            values.push(given);
-        }
         Ok(Self {
-            values,
+            values: last_of_each(lists.into_iter().flat_map(|(_, list)| list)),
+            repetitions,
             files_without_section,
         })
     }
+}
+
+/// Returns of each parameter the value that comes last, in the order of these.
+fn last_of_each(given: impl Iterator<Item = Override>) -> Vec<Override> {
+    let mut values: Vec<Option<Override>> = Vec::new();
+    let mut place_of = HashMap::new();
+    for value in given {
+        if let Some(earlier) = place_of.insert(value.name.clone(), values.len()) {
+            values[earlier] = None;
+        }
+        values.push(Some(value));
+    }
+    values.into_iter().flatten().collect()
 }
 
 fn is_for(pattern: &str, node: &str) -> bool {
     ros2args::match_wildcard_pattern(pattern, node)
 }
 
-fn from_section(section: Section, path: &Path) -> (String, Vec<Override>) {
+fn from_section(section: Section, path: &Path) -> Vec<Override> {
     let is_shared = !section.names_one_node();
     let value = |given: FileParameter| Override {
         name: given.name,
@@ -126,13 +155,51 @@ fn from_section(section: Section, path: &Path) -> (String, Vec<Override>) {
         },
         is_shared,
     };
-    let values = section.parameters.into_iter().map(value).collect();
-    (section.written, values)
+    section.parameters.into_iter().map(value).collect()
+}
+
+/// `seen`: the line of each parameter under each name or pattern of this file so far.
+fn repeated(
+    written: &str,
+    list: &[Override],
+    seen: &mut HashMap<(String, String), u64>,
+) -> Vec<Repetition> {
+    let repetition = |given: &Override| {
+        let Place::File { line, .. } = given.place else {
+            return None;
+        };
+        let first = seen.insert((written.to_owned(), given.name.clone()), line)?;
+        Some(Repetition {
+            name: given.name.clone(),
+            place: given.place.clone(),
+            first,
+            is_shared: given.is_shared,
+        })
+    };
+    list.iter().filter_map(repetition).collect()
 }
 
 fn append(lists: &mut Vec<(String, Vec<Override>)>, (written, values): (String, Vec<Override>)) {
     match lists.iter_mut().find(|(known, _)| *known == written) {
         Some((_, list)) => list.extend(values),
         None => lists.push((written, values)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_parameter_keeps_its_last_value_whatever_their_number() {
+        let given = |number: i64| Override {
+            name: format!("p{}", number % 50_000),
+            value: Some(ParameterValue::Integer(number)),
+            place: Place::Argument,
+            is_shared: false,
+        };
+        let found = last_of_each((0..150_000).map(given));
+        assert_eq!(found.len(), 50_000);
+        assert_eq!(found[7], given(100_007));
     }
 }

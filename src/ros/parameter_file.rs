@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use granit_parser::{Event, Parser, ScalarStyle, ScanError, Tag};
 
-use super::scalar;
+use super::{rules, scalar};
 use crate::config::ParameterValue;
 use crate::text::clip;
 
@@ -34,7 +34,7 @@ pub struct Section {
 pub struct FileParameter {
     /// Name, nested keys joined by dots.
     pub name: String,
-    /// Value; none where the file has a list, an alias or nothing.
+    /// Value; none where the file has a list, an empty map, an alias or nothing.
     pub value: Option<ParameterValue>,
     /// Line in the file, from 1.
     pub line: u64,
@@ -63,19 +63,37 @@ pub enum ParameterFileError {
         /// What the parser says, with line and column.
         reason: String,
     },
-    /// A value that is set twice under one node name.
+    /// A node's name that no node can have.
     #[error(
-        "parameter file {path:?}, line {line}: {name:?} is set twice under {pattern:?}, first in line {first}"
+        "parameter file {path:?}, line {line}: {name:?} is no node's name or pattern: expected names between slashes, or * and ** in place of whole names"
     )]
-    Repeated {
+    BadNode {
         /// The file.
         path: PathBuf,
-        /// Of the second one.
+        /// Where its parameters begin.
         line: u64,
-        /// Of the first one.
-        first: u64,
-        /// The parameter.
+        /// As it is written.
         name: String,
+    },
+    /// Parameters without a node's name over them.
+    #[error(
+        "parameter file {path:?}, line {line}: ros__parameters stands at the top: expected a node's name or a pattern such as /** above it"
+    )]
+    NoNode {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
+    },
+    /// A list or a word where names with values belong.
+    #[error(
+        "parameter file {path:?}, line {line}: expected names with values under ros__parameters of {pattern:?}"
+    )]
+    NoNames {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        line: u64,
         /// The node name or pattern.
         pattern: String,
     },
@@ -112,38 +130,32 @@ impl Section {
         !self.pattern.contains('*')
     }
 
-    /// Checks that no parameter is set twice.
+    /// Checks that every value has a name.
     ///
     /// # Errors
-    /// [`ParameterFileError::Repeated`]. DIFFERENCE: ROS takes the last one.
+    /// [`ParameterFileError::NoNames`].
     pub fn check(&self, path: &Path) -> Result<(), ParameterFileError> {
-        for (index, parameter) in self.parameters.iter().enumerate() {
-            let earlier = self.parameters[..index]
-                .iter()
-                .find(|earlier| earlier.name == parameter.name);
-            if let Some(earlier) = earlier {
-                return Err(ParameterFileError::Repeated {
-                    path: path.to_owned(),
-                    line: parameter.line,
-                    first: earlier.line,
-                    name: clip(&parameter.name),
-                    pattern: clip(&self.pattern),
-                });
-            }
-        }
-        Ok(())
+        let nameless = self.parameters.iter().find(|given| given.name.is_empty());
+        nameless.map_or(Ok(()), |given| {
+            Err(ParameterFileError::NoNames {
+                path: path.to_owned(),
+                line: given.line,
+                pattern: clip(&self.pattern),
+            })
+        })
     }
 }
 
-/// Returns the value of one word of YAML, as `-p` has it; none where it is a list, a map or nothing.
+/// Returns the value of one word of YAML, as `-p` has it; none where it is a list or nothing.
 ///
 /// # Errors
-/// The reason why it is no YAML.
+/// The reason why it is no YAML, or that it is a map.
 pub(super) fn value(word: &str) -> Result<Option<ParameterValue>, String> {
     let tree = Reader::new(word).document().map_err(|fault| fault.reason)?;
     Ok(match tree.map(|tree| tree.value) {
         Some(Value::Scalar(value)) => value,
-        _ => None,
+        Some(Value::Map(_)) => return Err("expected one value, got a map".to_owned()),
+        Some(Value::List) | None => None,
     })
 }
 
@@ -156,15 +168,16 @@ fn parse(text: &str, path: &Path) -> Result<Vec<Section>, ParameterFileError> {
         })?;
     let mut found = Vec::new();
     if let Some(document) = &document {
-        sections(document, "", "", path, &mut found)?;
+        sections(document, "", path, &mut found)?;
     }
     Ok(found)
 }
 
 /// Appends every section; names nest as namespaces.
+///
+/// A name that ROS does not know may be meant for this node, so it is not passed over.
 fn sections(
     tree: &Tree,
-    prefix: &str,
     written: &str,
     path: &Path,
     found: &mut Vec<Section>,
@@ -173,21 +186,11 @@ fn sections(
         Value::Map(entries) => {
             for (key, value) in entries {
                 if key == "ros__parameters" {
-                    let mut parameters = Vec::new();
-                    flatten("", value, &mut parameters);
-                    found.push(Section {
-                        pattern: prefix.to_owned(),
-                        written: written.to_owned(),
-                        parameters,
-                    });
+                    found.push(section(value, written, path)?);
+                } else if written.is_empty() {
+                    sections(value, key, path, found)?;
                 } else {
-                    let name = format!("{prefix}/{}", key.trim_matches('/'));
-                    let written = if written.is_empty() {
-                        key.clone()
-                    } else {
-                        format!("{written}/{key}")
-                    };
-                    sections(value, &name, &written, path, found)?;
+                    sections(value, &format!("{written}/{key}"), path, found)?;
                 }
             }
             Ok(())
@@ -197,9 +200,27 @@ fn sections(
         Value::Scalar(Some(_)) | Value::List => Err(ParameterFileError::NoParameters {
             path: path.to_owned(),
             line: tree.line,
-            key: clip(prefix),
+            key: clip(written),
         }),
     }
+}
+
+fn section(values: &Tree, written: &str, path: &Path) -> Result<Section, ParameterFileError> {
+    let (path, line) = (path.to_owned(), values.line);
+    if written.is_empty() {
+        return Err(ParameterFileError::NoNode { path, line });
+    }
+    if !rules::is_node_pattern(written) {
+        let name = clip(written);
+        return Err(ParameterFileError::BadNode { path, line, name });
+    }
+    let mut parameters = Vec::new();
+    flatten("", values, &mut parameters);
+    Ok(Section {
+        pattern: format!("/{}", written.strip_prefix('/').unwrap_or(written)),
+        written: written.to_owned(),
+        parameters,
+    })
 }
 
 fn flatten(prefix: &str, tree: &Tree, into: &mut Vec<FileParameter>) {
@@ -209,6 +230,7 @@ fn flatten(prefix: &str, tree: &Tree, into: &mut Vec<FileParameter>) {
         line: tree.line,
     };
     match &tree.value {
+        Value::Map(entries) if entries.is_empty() && !prefix.is_empty() => into.push(leaf(None)),
         Value::Map(entries) => {
             for (key, value) in entries {
                 let name = if prefix.is_empty() {
@@ -346,11 +368,14 @@ impl From<&ScanError> for Fault {
 
 /// Returns what a word means; none for nothing at all.
 fn meaning(word: &str, style: ScalarStyle, tag: Option<&Tag>) -> Option<ParameterValue> {
-    let is_text = style != ScalarStyle::Plain || tag.is_some_and(|tag| tag.suffix() == "str");
-    if is_text {
+    // rcl minds quotes and the full tag, and not whether a word stands in a block.
+    let is_quoted = matches!(style, ScalarStyle::SingleQuoted | ScalarStyle::DoubleQuoted);
+    if word.is_empty() && style == ScalarStyle::Plain {
+        None
+    } else if is_quoted || tag.and_then(Tag::core_suffix) == Some("str") {
         Some(ParameterValue::String(word.to_owned()))
     } else {
-        (!word.is_empty()).then(|| scalar::plain(word))
+        Some(scalar::plain(word))
     }
 }
 
@@ -406,13 +431,27 @@ uav1:
     }
 
     #[test]
-    fn a_parameter_that_is_set_twice_is_found_when_its_section_is_checked() {
-        let found = parsed("n:\n  ros__parameters:\n    a: {b: 1}\n    a.b: 2\n").expect("YAML");
-        let error = found[0].check(Path::new("p.yaml")).expect_err("twice");
-        assert_eq!(
-            error.to_string(),
-            "parameter file \"p.yaml\", line 4: \"a.b\" is set twice under \"/n\", first in line 3"
-        );
+    fn values_without_names_are_found_when_their_section_is_checked() {
+        for values in ["[a, 1]", "3", "{'': 1}"] {
+            let found = parsed(&format!("n:\n  ros__parameters: {values}\n")).expect("YAML");
+            let error = found[0].check(Path::new("p.yaml")).expect_err(values);
+            assert_eq!(
+                error.to_string(),
+                "parameter file \"p.yaml\", line 2: expected names with values under ros__parameters of \"/n\""
+            );
+        }
+    }
+
+    #[test]
+    fn a_section_that_no_node_can_have_is_refused_and_not_passed_over() {
+        let text = |name| format!("{name}:\n  ros__parameters:\n    a: 1\n");
+        for name in ["tanker_*", "/n/", "//n", "n m", "1n", "n.m"] {
+            let error = parsed(&text(name)).expect_err(name);
+            assert!(error.to_string().contains("is no node's name"), "{error}");
+        }
+        assert!(parsed("/a: {/n: {ros__parameters: {a: 1}}}").is_err());
+        let error = parsed("ros__parameters: {a: 1}\n").expect_err("no name");
+        assert!(error.to_string().contains("above it"), "{error}");
     }
 
     #[test]
@@ -469,6 +508,31 @@ uav1:
             line,
         });
         assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn quotes_and_the_tag_of_text_make_text_and_blocks_do_not() {
+        for (word, value) in [
+            ("|-\n    3", Some(ParameterValue::Integer(3))),
+            (">-\n    yes", Some(ParameterValue::Bool(true))),
+            ("|\n    3", Some(ParameterValue::String("3\n".into()))),
+            ("!!str 3", Some(ParameterValue::String("3".into()))),
+            (
+                "!<tag:yaml.org,2002:str> 3",
+                Some(ParameterValue::String("3".into())),
+            ),
+            ("!str 3", Some(ParameterValue::Integer(3))),
+            ("!!int 3.5", Some(ParameterValue::Double(3.5))),
+            ("!!str", None),
+            ("{}", None),
+            ("[]", None),
+        ] {
+            let found = parsed(&format!(
+                "n: {{ros__parameters: }}\nm:\n ros__parameters:\n  a: {word}\n"
+            ));
+            let found = found.expect(word).remove(1).parameters;
+            assert_eq!(found[0].value, value, "{word}");
+        }
     }
 
     #[test]

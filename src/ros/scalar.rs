@@ -11,7 +11,8 @@ const FALSE: [&str; 11] = [
 
 /// Returns the value of an unquoted word: a bool, a whole number, a number, or else text.
 ///
-/// `010` is 8 and `0x10` is 16, as for C's `strtol`; `~` and `null` are text. A number that no double holds is text.
+/// `010` is 8 and `0x10` is 16, as for C's `strtol`; `~` and `null` are text. A number that no double holds is text, too
+/// large or too near 0.
 ///
 /// # Source
 /// rcl, `rcl_yaml_param_parser`, as rclpy shows it. DIFFERENCE: C's hexadecimal fractions (`0x1p3`) are text here.
@@ -56,17 +57,19 @@ fn whole_number(word: &str) -> Option<i64> {
 }
 
 fn number(word: &str) -> Option<f64> {
-    let unsigned = word.trim_start_matches(['+', '-']);
-    // YAML's own spellings have a dot before the word.
+    let unsigned = word.strip_prefix(['+', '-']).unwrap_or(word);
+    // YAML's own spellings have a dot before the word; a signed .nan is none of them.
     let spelt = match unsigned {
-        ".inf" | ".Inf" | ".INF" | ".nan" | ".NaN" | ".NAN" => word.replacen('.', "", 1),
+        ".inf" | ".Inf" | ".INF" => word.replacen('.', "", 1),
+        ".nan" | ".NaN" | ".NAN" if word == unsigned => "nan".to_owned(),
         _ => word.to_owned(),
     };
     let value: f64 = spelt.parse().ok()?;
-    let is_written_out = unsigned.starts_with(|first: char| first.is_ascii_digit() || first == '.');
-    let is_named = unsigned == ".inf" || unsigned == ".Inf" || unsigned == ".INF";
-    let overflows = value.is_infinite() && is_written_out && !is_named;
-    (!overflows).then_some(value)
+    let is_in_digits = word == spelt && unsigned.contains(|letter: char| letter.is_ascii_digit());
+    let mantissa = unsigned.split(['e', 'E']).next().unwrap_or_default();
+    let is_nought = !mantissa.contains(|letter: char| matches!(letter, '1'..='9'));
+    let is_held = value.is_normal() || (value == 0.0 && is_nought);
+    (is_held || !is_in_digits).then_some(value)
 }
 
 #[cfg(test)]
@@ -95,13 +98,16 @@ mod tests {
             ("1E3", Double(1000.0)),
             ("-.inf", Double(f64::NEG_INFINITY)),
             ("infinity", Double(f64::INFINITY)),
+            ("0e-400", Double(0.0)),
+            ("-0.0", Double(-0.0)),
+            ("2.2250738585072014e-308", Double(f64::MIN_POSITIVE)),
         ] {
             assert_eq!(plain(word), value, "{word}");
         }
         assert!(matches!(plain(".nan"), Double(value) if value.is_nan()));
         for word in [
-            "tRue", "yEs", "0o10", "0b1", "0x", "1_000", "1e", "1e400", "--1", "+-1", "~", "null",
-            "12:30", "", ".", "0x-1",
+            "tRue", "yEs", "0o10", "0b1", "0x", "1_000", "1e", "1e400", "1e-400", "-1e-310", "--1",
+            "+-1", "~", "null", "12:30", "", ".", "0x-1", "-.nan", "+.NaN", ".iNf",
         ] {
             assert_eq!(plain(word), String(word.to_owned()), "{word}");
         }

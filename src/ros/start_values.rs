@@ -22,6 +22,18 @@ pub enum StartParameterError {
         /// What is wrong.
         source: StartValueError,
     },
+    /// A parameter that a file sets twice under one node name or pattern.
+    ///
+    /// DIFFERENCE: ROS takes the last one.
+    #[error("{place}: parameter {name:?} is set twice under the same name, first in line {first}")]
+    Repeated {
+        /// Of the second one.
+        place: Place,
+        /// The parameter.
+        name: String,
+        /// Line of the first one.
+        first: u64,
+    },
     /// A list, a map, or nothing where a value belongs.
     #[error("{place}: parameter {name:?} needs a bool, a number or text")]
     NoScalar {
@@ -77,10 +89,58 @@ pub fn start_values(
             path.display()
         ));
     }
-    for given in overrides.values {
-        found.take(given)?;
+    for given in overrides.repetitions {
+        if !given.is_shared || is_known(&given.name) {
+            return Err(StartParameterError::Repeated {
+                place: given.place,
+                name: clip(&given.name),
+                first: given.first,
+            });
+        }
     }
+    let mut of_others = Vec::new();
+    for given in overrides.values {
+        // Below a pattern stand the parameters of many nodes.
+        if given.is_shared && !is_known(&given.name) {
+            of_others.push(given);
+        } else {
+            found.take(given)?;
+        }
+    }
+    found.warnings.extend(warnings_of_unknown(&of_others));
     Ok(found)
+}
+
+fn is_known(name: &str) -> bool {
+    name.starts_with(qos_overrides::PREFIX) || ParameterSpec::find(name).is_some()
+}
+
+/// Returns one warning for each name that is close to one of ours, and one for all the others.
+fn warnings_of_unknown(given: &[Override]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut far = Vec::new();
+    for given in given {
+        match nearest_name(&given.name) {
+            Some(close) => warnings.push(format!(
+                "{}: this node has no parameter {:?}, is {close} meant?",
+                given.place,
+                clip(&given.name)
+            )),
+            None => far.push(given),
+        }
+    }
+    if let Some((first, others)) = far.split_first() {
+        let others = match others.len() {
+            0 => String::new(),
+            count => format!(", nor {count} others that files set for several nodes"),
+        };
+        warnings.push(format!(
+            "{}: this node has no parameter {:?}{others}",
+            first.place,
+            clip(&first.name)
+        ));
+    }
+    warnings
 }
 
 impl StartValues {
@@ -95,19 +155,6 @@ impl StartValues {
     }
 
     fn take(&mut self, given: Override) -> Result<(), StartParameterError> {
-        let is_known = given.name.starts_with(qos_overrides::PREFIX)
-            || ParameterSpec::find(&given.name).is_some();
-        // Below a pattern stand the parameters of many nodes.
-        if given.is_shared && !is_known {
-            let close = nearest_name(&given.name).map(|name| format!(", is {name} meant?"));
-            self.warnings.push(format!(
-                "{}: this node has no parameter {:?}{}",
-                given.place,
-                clip(&given.name),
-                close.unwrap_or_default()
-            ));
-            return Ok(());
-        }
         let Some(value) = given.value else {
             return Err(StartParameterError::NoScalar {
                 place: given.place,

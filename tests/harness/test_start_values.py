@@ -149,6 +149,8 @@ REFUSALS = [
     ["file " + section("/**", f"{P}: [1, 2]")],
     ["file " + section(NODE, f"{P}: ")],
     ["file " + section(NODE, f"{P}: *x")],
+    ["-r /**:pose:=x"],
+    [f"-r /{NODE}:pose:=x"],
     ["file - a\n"],
     ["file {\n"],
     ["file " + f"{NODE}: 1\n"],
@@ -175,7 +177,7 @@ WORDS = [
     *["true", "True", "TRUE", "false", "False", "FALSE", "tRue", "yEs", "oN"],
     *["010", "-010", "0x10", "0X1f", "-0x10", "0o10", "0b1", "00", "0", "-0", "+1", "1_000", "0x"],
     *["9000000000000000", "08", "1.", ".5", "-.5", "+1.5", "1e2", "1E2", "1e", "e1", "1d3", "--1"],
-    *["1e400", "~", "null", "''", '""', "'1'", '"yes"', "!!str 1", "!!str yes", "!!int 3", "!!bool yes"],
+    *["1e400", "1e-400", "0e5", "~", "null", "''", '""', "'1'", '"yes"', "!!str 1", "!!str yes", "!!int 3", "!!bool yes"],
     *["1,2", "12:30", "2001-01-01", "a#b", "a:b", "abc", "0.0", "1.5e1", "&x 1"],
 ]
 OF_TYPE = {bool: "publish_tf", int: P, float: "camera_mount_roll_deg", str: "tanker_frame_id"}
@@ -184,6 +186,10 @@ OF_TYPE = {bool: "publish_tf", int: P, float: "camera_mount_roll_deg", str: "tan
 DIFFERENCES: dict[str, tuple[str, str]] = {
     # A slip that nobody would see.
     "the_same_parameter_twice": (REFUSED, "file " + section(NODE, f"{P}: 1", f"{P}: 2")),
+    "the_same_parameter_in_two_sections": (
+        REFUSED,
+        "file " + section(NODE, f"{P}: 1") + section(NODE, f"{P}: 2"),
+    ),
     "two_documents": (REFUSED, "file " + section(NODE, f"{P}: 1") + "---\n" + section(NODE, f"{P}: 2")),
     "unknown_under_our_own_name": (REFUSED, "file " + section(NODE, "px4_minus_ros: 1")),
     "unknown_as_an_argument": (REFUSED, "px4_minus_ros:=1"),
@@ -197,6 +203,7 @@ DIFFERENCES: dict[str, tuple[str, str]] = {
     # A file that holds something else is the wrong file.
     "a_file_of_mere_text": (REFUSED, "file just text\n"),
     "a_comment_for_a_value": (REFUSED, f"{P}:=#1"),
+    "an_empty_map_for_a_value": (REFUSED, "file " + section(NODE, f"{P}: {{}}")),
     # A section whose lines are all commented out.
     "nothing_under_ros__parameters": ("accepted", "file " + f"{NODE}:\n  ros__parameters:\n"),
 }
