@@ -3,9 +3,10 @@
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tanker_pose::camera::{Camera, CameraInfo};
+use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo};
 use tanker_pose::estimation::{
-    Estimator, EstimatorSettings, Initialisation, Observation, Refinement,
+    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Initialisation,
+    Observation, Refinement,
 };
 use tanker_pose::simulation::{Scene, paper_camera, paper_scene, pose_in_camera};
 use tanker_pose::target::Marker;
@@ -103,7 +104,48 @@ fn no_solve_of_64_points_or_fewer_allocates() {
     }
 }
 
-/// Without this the test above would pass with a counter that does not count.
+#[test]
+fn no_solve_with_a_full_budget_allocates() {
+    let mode = |name: &str, places: &[usize], sigma: f64| {
+        let mut change = CalibrationChange::zeros();
+        for &place in places {
+            change[place] = sigma;
+        }
+        CalibrationMode {
+            name: name.to_owned(),
+            change,
+        }
+    };
+    for camera in [paper_camera(), wide_angle()] {
+        for count in [6, 12, MOST] {
+            let (camera, clean) = frame(camera.clone(), count);
+            let survey: Vec<(u32, f64)> = clean.iter().map(|seen| (seen.id, 0.02)).collect();
+            let bend = |seen: &Observation| {
+                let up = 0.3 * (seen.marker_in_tanker.y / 7.0).powi(2);
+                (seen.id, Vector3::new(0.0, 0.0, up))
+            };
+            let flex = vec![FlexMode {
+                name: "wing_bending".to_owned(),
+                time_constant_s: Some(5.0),
+                shape: clean.iter().map(bend).collect(),
+            }];
+            let calibration = vec![
+                mode("focal_length", &[0, 1], 0.003),
+                mode("principal_point_u", &[2], 3.0),
+                mode("principal_point_v", &[3], 3.0),
+                mode("k1", &[4], 0.02),
+            ];
+            let budget = ErrorBudget::new(&survey, flex, calibration, 0.5).expect("a budget");
+            let estimator = Estimator::new(EstimatorSettings::default()).with_budget(budget);
+            let solve = || estimator.estimate(&camera, &clean, None);
+            assert!(solve().expect("a pose").is_trusted());
+            let counted = allocation_counter::measure(|| drop(solve()));
+            assert_eq!(counted.count_total, 0, "{count} points");
+        }
+    }
+}
+
+/// Without this the tests above would pass with a counter that does not count.
 #[test]
 fn more_than_64_points_do_allocate() {
     let (camera, seen) = frame(paper_camera(), MOST + 1);

@@ -12,6 +12,7 @@
 //! [`Camera::ray_from_pixel`] and [`Camera::project`] refuse what lies beyond the same limit, found at
 //! construction, instead of returning a ray that is plausible and wrong.
 
+mod calibration;
 mod distortion;
 mod error;
 mod file;
@@ -21,6 +22,7 @@ mod tests;
 
 use nalgebra::{Matrix2, Point2};
 
+pub use calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};
 pub use error::{CameraError, UndistortError};
 pub use file::{CameraFileError, CameraFileWarning};
 pub use info::{CameraInfo, RegionOfInterest};

@@ -112,6 +112,7 @@ fn estimator_settings(parameters: &Parameters) -> EstimatorSettings {
         max_outliers: parameters.count("max_outliers"),
         trust_probability: parameters.double("trust_probability"),
         max_ambiguity: parameters.double("max_ambiguity"),
+        attitude_sigma_rad: None,
     }
 }
 

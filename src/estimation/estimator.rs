@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
+use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses};
 use super::exclude::{self, Suspects};
 use super::initialise::{self, linear_rotation};
 use super::lanes::points::{INLINE_POINTS, mean};
@@ -33,6 +34,8 @@ pub(crate) const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 pub struct Estimator {
     settings: EstimatorSettings,
     limits: TrustLimits,
+    /// `None` if nothing is in doubt.
+    budget: Option<ErrorBudget>,
 }
 
 /// A fit with what is known about its rivals.
@@ -48,7 +51,61 @@ impl Estimator {
     #[must_use]
     pub fn new(settings: EstimatorSettings) -> Self {
         let limits = TrustLimits::new(settings.trust_probability);
-        Self { settings, limits }
+        Self {
+            settings,
+            limits,
+            budget: None,
+        }
+    }
+
+    /// Returns the estimator with a budget of what map, calibration and airframe may have wrong. An empty one changes
+    /// nothing.
+    #[must_use]
+    pub fn with_budget(self, budget: ErrorBudget) -> Self {
+        Self {
+            budget: (!budget.is_empty()).then_some(budget),
+            ..self
+        }
+    }
+
+    /// Returns the budget, if anything is in doubt.
+    #[must_use]
+    pub fn budget(&self) -> Option<&ErrorBudget> {
+        self.budget.as_ref()
+    }
+
+    /// Returns what each cause of the budget did in a frame: its amplitude and its share of the covariance; `None`
+    /// for an estimate that is not maximum likelihood.
+    ///
+    /// # Inputs
+    /// * `observations`: those that the solution was estimated from.
+    #[must_use]
+    pub fn causes(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        solution: &Solution,
+    ) -> Option<FrameCauses> {
+        if self.settings.refinement != Refinement::MaximumLikelihood {
+            return None;
+        }
+        let floored = with_sigma_floor(observations, self.settings.min_points);
+        let observations = floored.as_deref().unwrap_or(observations);
+        let information = self.attitude_prior().map_or(0.0, |prior| prior.information);
+        budget::frame_causes(
+            self.budget.as_ref(),
+            information,
+            camera,
+            observations,
+            solution,
+        )
+    }
+
+    fn attitude_prior(&self) -> Option<AttitudePrior> {
+        self.settings.attitude_sigma_rad.map(|sigma| AttitudePrior {
+            camera_from_tanker: self.settings.nominal_camera_from_tanker,
+            information: sigma.powi(-2),
+        })
     }
 
     /// Returns the settings in force.
@@ -151,16 +208,43 @@ impl Estimator {
         observations: &[Observation],
         previous: Option<&Rotation3<f64>>,
     ) -> Result<Solution, EstimateError> {
-        let start = self.settings.initialisation;
+        if self.budget.is_some() || self.settings.attitude_sigma_rad.is_some() {
+            return self.estimate_in_doubt(camera, observations, previous);
+        }
         let mut room = Room::new();
         let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
+        self.solve(&problem, previous)
+    }
+
+    /// The same with a budget, which needs room of its own.
+    #[inline(never)]
+    fn estimate_in_doubt(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        previous: Option<&Rotation3<f64>>,
+    ) -> Result<Solution, EstimateError> {
+        let mut room = Room::new();
+        let mut doubts = FrameBudget::new(self.attitude_prior());
+        let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
+        doubts.fill(self.budget.as_ref(), camera, observations, &problem.points);
+        self.solve(&problem.in_doubt(&doubts), previous)
+    }
+
+    #[inline(always)]
+    fn solve(
+        &self,
+        problem: &Problem,
+        previous: Option<&Rotation3<f64>>,
+    ) -> Result<Solution, EstimateError> {
+        let start = self.settings.initialisation;
         let nominal = || {
             let seed = &self.settings.nominal_camera_from_tanker;
-            self.solve_from(&problem, seed, Initialisation::Nominal)
+            self.solve_from(problem, seed, Initialisation::Nominal)
         };
         match (start, previous) {
             (Initialisation::Previous, Some(seed)) => {
-                match self.solve_from(&problem, seed, start) {
+                match self.solve_from(problem, seed, start) {
                     Ok(solution) if solution.is_trusted() => Ok(solution),
                     // A tanker that turned meanwhile, or a last pose that was wrong: begin anew.
                     _ => nominal(),
@@ -168,10 +252,10 @@ impl Estimator {
             }
             (Initialisation::Nominal | Initialisation::Previous, _) => nominal(),
             (Initialisation::Dlt, _) => {
-                let seed = dlt_seed(camera, observations)?;
-                self.solve_from(&problem, &seed, start)
+                let seed = dlt_seed(problem.camera, problem.observations)?;
+                self.solve_from(problem, &seed, start)
             }
-            (Initialisation::Global, _) => self.solve_globally(&problem),
+            (Initialisation::Global, _) => self.solve_globally(problem),
         }
     }
 
@@ -301,14 +385,15 @@ impl Estimator {
     fn judge(&self, problem: &Problem, judged: &Judged) -> Result<Solution, EstimateError> {
         let fit = judged.fit;
         let residuals = 2 * problem.observations.len();
+        let degrees_of_freedom = problem.degrees_of_freedom();
         let lever = fit.pose.rotation * problem.points.mean.coords;
         Ok(Solution {
             camera_from_tanker: fit.pose.about_origin(&lever),
             covariance: honest_covariance(problem, fit, &lever)?,
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
-            degrees_of_freedom: u16::try_from(residuals - 6).unwrap_or(u16::MAX),
-            chi_squared_limit: self.limits.limit(residuals - 6),
+            degrees_of_freedom: u16::try_from(degrees_of_freedom).unwrap_or(u16::MAX),
+            chi_squared_limit: self.limits.limit(degrees_of_freedom),
             iterations: judged.iterations,
             initialisation: judged.initialisation,
             ambiguity: judged.ambiguity,

@@ -17,6 +17,7 @@
 //! | `K`    | [`Camera`]           | px                      |
 
 mod ambiguity;
+mod budget;
 mod centred_pose;
 mod collinearity;
 mod covariance;
@@ -37,6 +38,10 @@ use nalgebra::{Isometry3, Point3, Rotation3, Vector2};
 use crate::camera::{Camera, Pixel, Ray, UndistortError};
 use crate::geometry::PoseCovariance;
 
+pub use budget::{
+    BudgetError, CalibrationMode, Cause, CauseKind, ErrorBudget, FlexMode, FrameCauses,
+    MAX_FLEX_MODES,
+};
 pub use estimator::Estimator;
 pub(crate) use estimator::PRIOR_SIGMA;
 pub use initialise::linear_rotation;
@@ -95,6 +100,8 @@ pub struct EstimatorSettings {
     pub trust_probability: f64,
     /// A rival pose at least this likely means refusal, 0 to 1; 1 or more: never.
     pub max_ambiguity: f64,
+    /// Standard deviation of the attitude about the nominal one, each axis, rad; `None`: nothing is known of it.
+    pub attitude_sigma_rad: Option<f64>,
 }
 
 impl Default for EstimatorSettings {
@@ -109,6 +116,7 @@ impl Default for EstimatorSettings {
             max_outliers: 1,
             trust_probability: 0.999,
             max_ambiguity: 0.1,
+            attitude_sigma_rad: None,
         }
     }
 }

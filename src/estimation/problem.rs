@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Rotation3};
 
+use super::budget::{FrameBudget, InDoubt};
 use super::centred_pose::CentredPose;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
@@ -20,14 +21,20 @@ const FIXED_POINT_TOLERANCE: f64 = 1e-7;
 /// under 1e-13 of the chosen one's.
 pub(crate) const NEGLIGIBLE: f64 = 60.0;
 
+/// Share of the chi-squared that one step promises which a fit certainly does not fall below: far from a minimum a
+/// step promises too little or too much, but hardly by this factor.
+const SURE_SHARE: f64 = 0.25;
+
 /// A frame with its camera: what every start and every rival pose shares.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
-    camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     refinement: Refinement,
     pub(crate) observations: &'a [Observation],
     pub(crate) points: Points<'a>,
     pub(crate) cost: &'a CollinearityCost,
+    /// What else than noise the pixels may have wrong; none: nothing.
+    doubts: Option<&'a FrameBudget>,
 }
 
 /// Where a problem's numbers stand: seven kilobytes that are filled in place and never moved.
@@ -116,7 +123,30 @@ impl<'a> Problem<'a> {
             observations,
             points,
             cost,
+            doubts: None,
         })
+    }
+
+    /// Returns the same problem with a budget that has been filled for its points.
+    pub(crate) fn in_doubt(self, doubts: &'a FrameBudget) -> Self {
+        Self {
+            doubts: Some(doubts),
+            ..self
+        }
+    }
+
+    fn doubt(&self, budget: &'a FrameBudget) -> InDoubt<'_> {
+        InDoubt {
+            camera: self.camera,
+            observations: self.observations,
+            points: &self.points,
+            budget,
+        }
+    }
+
+    /// Returns how many degrees of freedom the residuals have, those of a prior included.
+    pub(crate) fn degrees_of_freedom(&self) -> usize {
+        2 * self.observations.len() - 6 + self.doubts.map_or(0, FrameBudget::degrees_of_freedom)
     }
 
     /// Returns the step, rad, under which a minimum of the cost is near enough.
@@ -147,6 +177,8 @@ impl<'a> Problem<'a> {
         chi_squared: f64,
     ) -> Option<newton::Minimum> {
         let limit = match self.refinement {
+            // The cost knows nothing of the budget, by which chi-squared may be far less.
+            _ if self.doubts.is_some() => f64::INFINITY,
             Refinement::None => f64::INFINITY,
             Refinement::MaximumLikelihood => {
                 let depth = self.cost.centre_in_camera(seed).z.abs() + self.points.radius;
@@ -160,13 +192,19 @@ impl<'a> Problem<'a> {
     /// Returns the final pose from a minimum of the cost, every point in front of the camera.
     pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
         let start = self.placed(rotation);
-        let mut fit = match self.refinement {
-            Refinement::None => self.as_it_is(start),
-            Refinement::MaximumLikelihood if self.camera.is_pinhole() => vectorised(PinholeFit {
-                problem: self,
-                start,
-            }),
-            Refinement::MaximumLikelihood => {
+        let mut fit = match (self.refinement, self.doubts) {
+            (Refinement::None, _) => self.as_it_is(start),
+            (Refinement::MaximumLikelihood, Some(budget)) => self
+                .doubt(budget)
+                .fit(start)
+                .map_err(|failure| self.explain(failure, &start)),
+            (Refinement::MaximumLikelihood, None) if self.camera.is_pinhole() => {
+                vectorised(PinholeFit {
+                    problem: self,
+                    start,
+                })
+            }
+            (Refinement::MaximumLikelihood, None) => {
                 let explain = |failure| self.explain(failure, &start);
                 refine::maximum_likelihood(&self.lens_residuals(), start, explain)
             }
@@ -199,9 +237,9 @@ impl<'a> Problem<'a> {
 
     /// The paper's own estimate.
     fn as_it_is(&self, pose: CentredPose) -> Result<Fit, EstimateError> {
-        let (chi_squared, squared_residuals_px) =
-            refine::squared_residuals(&self.lens_residuals(), &pose)
-                .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
+        let (chi_squared, squared_residuals_px) = self
+            .chi_squared_at(&pose)
+            .ok_or_else(|| self.explain(FitFailure::StartNotVisible, &pose))?;
         Ok(Fit {
             pose,
             chi_squared,
@@ -209,6 +247,14 @@ impl<'a> Problem<'a> {
             solver: None,
             iterations: 0,
         })
+    }
+
+    /// Returns chi-squared and the squared residuals, px², at a pose; none where a point has no pixel there.
+    fn chi_squared_at(&self, pose: &CentredPose) -> Option<(f64, f64)> {
+        match self.doubts {
+            Some(budget) => self.doubt(budget).at(*pose),
+            None => refine::squared_residuals(&self.lens_residuals(), pose),
+        }
     }
 
     fn lens_residuals(&self) -> LensResiduals<'_> {
@@ -235,17 +281,21 @@ impl<'a> Problem<'a> {
     /// Returns by how much chi-squared rises when a fit is turned to another attitude, at the position that
     /// suits it best; none where a point has no pixel there.
     pub(crate) fn rise(&self, fit: &Fit, rotation: &Rotation3<f64>) -> Option<f64> {
-        let rise = match self.refinement {
+        let rise = match (self.refinement, self.doubts) {
+            (Refinement::MaximumLikelihood, Some(budget)) => {
+                let there = self.placed(rotation);
+                self.doubt(budget).with_attitude(there)? - fit.chi_squared
+            }
             // The cost is chi-squared times squared depths, to first order.
-            Refinement::MaximumLikelihood => {
+            (Refinement::MaximumLikelihood, None) => {
                 let depth = fit.pose.centre_in_camera.z;
                 let cost = |rotation| self.cost.value(Plain, rotation);
                 (cost(rotation) - cost(&fit.pose.rotation)) / (depth * depth)
             }
             // The paper's cost knows nothing of the noise.
-            Refinement::None => {
+            (Refinement::None, _) => {
                 let there = self.placed(rotation);
-                refine::squared_residuals(&self.lens_residuals(), &there)?.0 - fit.chi_squared
+                self.chi_squared_at(&there)?.0 - fit.chi_squared
             }
         };
         Some(rise.max(0.0))
@@ -256,6 +306,10 @@ impl<'a> Problem<'a> {
     ///
     /// The cost is the sum of squared whitened residuals times squared depths, to first order.
     pub(crate) fn least_chi_squared(&self, minimum: &newton::Minimum) -> Option<f64> {
+        if let Some(budget) = self.doubts {
+            let promised = self.doubt(budget).promised(self.placed(&minimum.rotation));
+            return promised.map(|promised| SURE_SHARE * promised);
+        }
         let centre_depth = self.cost.centre_in_camera(&minimum.rotation).z;
         let largest_depth = centre_depth + self.points.radius;
         (self.refinement == Refinement::MaximumLikelihood)
@@ -263,14 +317,17 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the cost above which a minimum does not count next to this one: its likelihood is negligible.
-    /// Infinite for the paper's cost, which is not weighted by the noise, and next to a minimum that may turn
+    /// Infinite for the paper's cost, which is not weighted by the noise, with a budget, which it does not know, and next to a minimum that may turn
     /// out to be none, with a marker behind the camera.
     pub(crate) fn negligible_cost(&self, best: &newton::Minimum) -> f64 {
         let (depth, radius) = (
             self.cost.centre_in_camera(&best.rotation).z,
             self.points.radius,
         );
-        if self.refinement == Refinement::MaximumLikelihood && depth > radius {
+        if self.refinement == Refinement::MaximumLikelihood
+            && depth > radius
+            && self.doubts.is_none()
+        {
             best.cost + NEGLIGIBLE * (depth + radius).powi(2)
         } else {
             f64::INFINITY

@@ -49,12 +49,13 @@ pub(crate) enum FitFailure {
 /// `D = (1/z) [fx 0 −fx x; 0 fy −fy y]` for a pinhole, the lens model's derivative times
 /// `(1/z) [1 0 −x; 0 1 −y]` in general; `J = [−D [R p]×, D]`, weighted by each point's sigma.
 #[inline(always)]
-pub(crate) fn maximum_likelihood<E>(
-    residuals: &impl Residuals,
+pub(crate) fn maximum_likelihood<E, R: Residuals>(
+    residuals: &R,
     start: CentredPose,
     explain: impl Fn(FitFailure) -> E,
 ) -> Result<Fit, E> {
     let singular = || explain(FitFailure::Singular);
+    let allowed = 1.0 + R::RISE;
     let mut pose = start;
     let mut here = residuals
         .linearise(&pose)
@@ -88,8 +89,8 @@ pub(crate) fn maximum_likelihood<E>(
         let trial = pose.moved(&step);
         if damping == 0.0
             && pose.is_near(&step)
-            && let Some(there) = residuals.slope(&trial)
-            && there.chi_squared <= here.slope.chi_squared
+            && let Some(there) = residuals.slope(&trial, &here.kept)
+            && there.chi_squared <= here.slope.chi_squared * allowed
         {
             let last = solver.solve(&there.gradient).map(|value| -value);
             let gain = -dot(&last, &there.gradient);
@@ -99,7 +100,7 @@ pub(crate) fn maximum_likelihood<E>(
             }
         }
         match residuals.linearise(&trial) {
-            Some(there) if there.slope.chi_squared <= here.slope.chi_squared => {
+            Some(there) if there.slope.chi_squared <= here.slope.chi_squared * allowed => {
                 (pose, here) = (trial, there);
                 damping = if damping < 1e-6 { 0.0 } else { damping * 0.1 };
             }

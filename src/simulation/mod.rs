@@ -10,6 +10,7 @@ mod paper_axes;
 mod scene;
 mod statistics;
 mod trial;
+mod world;
 
 pub use approach::{Approach, ApproachSettings, SimulatedFrame};
 pub use bound::cramer_rao_bound;
@@ -20,3 +21,4 @@ pub use paper_axes::{
 pub use scene::{Scene, paper_camera, paper_scene, pose_in_camera};
 pub use statistics::{FAILURE_DEG, Summary};
 pub use trial::{Method, Solver, Stop, TrialError, trial_generator};
+pub use world::World;

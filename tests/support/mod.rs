@@ -164,3 +164,25 @@ pub fn distance_squared(solution: &Solution, pose: &Isometry3<f64>) -> f64 {
         .mahalanobis_squared(&pose_error(pose, &solution.camera_from_tanker))
         .expect("a solution's covariance is positive definite")
 }
+
+/// The paper's markers and up to six more on wings, fuselage and tail.
+pub fn tanker_markers(count: usize) -> Vec<Marker> {
+    let more = [
+        (7, 4.0, -3.5, 0.5),
+        (8, 4.0, 3.5, 0.5),
+        (9, 2.0, -1.2, 0.2),
+        (10, 2.0, 1.2, 0.2),
+        (11, 6.0, -1.5, 2.0),
+        (12, 6.0, 1.5, 2.0),
+    ];
+    let mut markers = MarkerMap::shipped("paper")
+        .expect("shipped")
+        .markers()
+        .to_vec();
+    markers.extend(more.map(|(id, x, y, z)| Marker {
+        id,
+        marker_in_tanker: nalgebra::Point3::new(x, y, z),
+    }));
+    markers.truncate(count);
+    markers
+}

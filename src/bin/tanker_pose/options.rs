@@ -111,6 +111,7 @@ impl EstimatorOptions {
             max_outliers: usize::from(self.max_outliers),
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
+            attitude_sigma_rad: None,
         }
     }
 }

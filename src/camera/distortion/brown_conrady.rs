@@ -42,6 +42,43 @@ impl BrownConrady {
         lens
     }
 
+    /// Returns the lens with its coefficients changed: k1, k2, p1, p2, k3, k4, k5, k6.
+    pub fn with_change(&self, by: [f64; 8]) -> Self {
+        let [_, k1, k2, k3] = self.numerator;
+        let [_, k4, k5, k6] = self.denominator;
+        Self::new(
+            [
+                k1 + by[0],
+                k2 + by[1],
+                k3 + by[4],
+                k4 + by[5],
+                k5 + by[6],
+                k6 + by[7],
+            ],
+            [self.p1 + by[2], self.p2 + by[3]],
+        )
+    }
+
+    /// Returns the derivatives of the distorted point by k1, k2, p1, p2, k3, k4, k5, k6.
+    pub fn by_coefficients(&self, ideal: Point2<f64>) -> [Vector2<f64>; 8] {
+        let (x, y) = (ideal.x, ideal.y);
+        let s = x * x + y * y;
+        let inverse = 1.0 / polynomial::evaluate(&self.denominator, s);
+        let ratio = polynomial::evaluate(&self.numerator, s) * inverse;
+        let up = ideal.coords * inverse;
+        let down = -up * ratio;
+        [
+            up * s,
+            up * (s * s),
+            Vector2::new(2.0 * x * y, s + 2.0 * y * y),
+            Vector2::new(s + 2.0 * x * x, 2.0 * x * y),
+            up * (s * s * s),
+            down * s,
+            down * (s * s),
+            down * (s * s * s),
+        ]
+    }
+
     /// Returns the first radius at which `d(L r)/dr` falls to [`MIN_STRETCH`] or, on the way up to a pole, rises to
     /// [`MAX_STRETCH`], or at which the denominator has a root; at most that of 89°. All are roots of polynomials in
     /// `s`.

@@ -37,6 +37,29 @@ impl Equidistant {
         }
     }
 
+    /// Returns the lens with its coefficients changed: k1 to k4; further changes mean nothing.
+    pub fn with_change(&self, by: [f64; 8]) -> Self {
+        Self::new(std::array::from_fn(|index| self.k[index] + by[index]))
+    }
+
+    /// Returns the derivatives of the distorted point by k1 to k4, then zeros.
+    pub fn by_coefficients(ideal: Point2<f64>) -> [Vector2<f64>; 8] {
+        let radius = ideal.coords.norm();
+        let angle = radius.atan();
+        let outwards = if radius < CENTRE_RADIUS {
+            Vector2::zeros()
+        } else {
+            ideal.coords / radius
+        };
+        let mut power = angle;
+        let mut columns = [Vector2::zeros(); 8];
+        for column in columns.iter_mut().take(4) {
+            power *= angle * angle;
+            *column = outwards * power;
+        }
+        columns
+    }
+
     /// Returns `θ_d` and `dθ_d/dθ`.
     fn bend(&self, angle: f64) -> (f64, f64) {
         let [k1, k2, k3, k4] = self.k;

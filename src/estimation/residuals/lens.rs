@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2x3, Point3, Vector2};
 
 use super::sums::{Sums, Weight};
-use super::{Linearised, Residuals};
+use super::{Linearised, Residuals, Slope};
 use crate::camera::{Camera, Ray};
 use crate::estimation::Observation;
 use crate::estimation::centred_pose::CentredPose;
@@ -16,12 +16,19 @@ pub(crate) struct LensResiduals<'a> {
 }
 
 impl Residuals for LensResiduals<'_> {
+    type Kept = ();
+    const RISE: f64 = 0.0;
+
     fn linearise(&self, pose: &CentredPose) -> Option<Linearised> {
         let mut sums = Sums::new(0.0);
         for seen in self.observations {
             sums.add_seen(self.camera, seen, &self.markers_mean, pose)?;
         }
         sums.finish()
+    }
+
+    fn slope(&self, pose: &CentredPose, (): &()) -> Option<Slope> {
+        self.linearise(pose).map(|here| here.slope)
     }
 }
 

@@ -15,13 +15,15 @@ use super::lanes::information::{Information, Vector};
 
 pub(crate) use lens::LensResiduals;
 pub(crate) use pinhole::PinholeResiduals;
+pub(crate) use sums::{SlopeSums, Sums, Weight};
 
 /// Squared residuals and their first derivatives at a pose; rotation before position.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Linearised {
+pub(crate) struct Linearised<Kept = ()> {
     /// `JᵀJ`.
     pub(crate) information: Information,
     pub(crate) slope: Slope,
+    pub(crate) kept: Kept,
 }
 
 /// Squared residuals and half their gradient at a pose; rotation before position.
@@ -35,12 +37,14 @@ pub(crate) struct Slope {
 
 /// What is minimised.
 pub(crate) trait Residuals {
-    /// Returns the residuals' sums at a pose; none when a point has no pixel there.
-    fn linearise(&self, pose: &CentredPose) -> Option<Linearised>;
+    /// What a linearisation leaves to the slopes nearby.
+    type Kept: Copy;
+    /// Share by which the sum may rise in a step that is taken; 0 where the weights do not depend on the pose.
+    const RISE: f64;
 
-    /// Returns the same without second derivatives, where that is less work.
-    #[inline(always)]
-    fn slope(&self, pose: &CentredPose) -> Option<Slope> {
-        self.linearise(pose).map(|here| here.slope)
-    }
+    /// Returns the residuals' sums at a pose; none when a point has no pixel there.
+    fn linearise(&self, pose: &CentredPose) -> Option<Linearised<Self::Kept>>;
+
+    /// Returns the same without second derivatives, where that is less work; `kept` is from a pose nearby.
+    fn slope(&self, pose: &CentredPose, kept: &Self::Kept) -> Option<Slope>;
 }

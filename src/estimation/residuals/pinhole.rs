@@ -13,6 +13,9 @@ pub(crate) struct PinholeResiduals<'a, A> {
 }
 
 impl<A: Arithmetic> Residuals for PinholeResiduals<'_, A> {
+    type Kept = ();
+    const RISE: f64 = 0.0;
+
     #[inline(always)]
     fn linearise(&self, pose: &CentredPose) -> Option<Linearised> {
         let mut sums = Sums::new(Four::splat(self.arithmetic, 0.0));
@@ -33,7 +36,7 @@ impl<A: Arithmetic> Residuals for PinholeResiduals<'_, A> {
     }
 
     #[inline(always)]
-    fn slope(&self, pose: &CentredPose) -> Option<Slope> {
+    fn slope(&self, pose: &CentredPose, (): &()) -> Option<Slope> {
         let mut sums = SlopeSums::new(Four::splat(self.arithmetic, 0.0));
         let is_in_front = self.visit(
             pose,

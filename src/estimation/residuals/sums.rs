@@ -6,38 +6,38 @@ use crate::estimation::lanes::information::Information;
 
 /// Sums over points of `M`, `[a]× M`, `[a]× M [a]×ᵀ`, `s`, `a × s` and the squared residuals.
 #[derive(Clone, Copy)]
-pub(super) struct Sums<N> {
-    pub(super) zero: N,
+pub(crate) struct Sums<N> {
+    pub(crate) zero: N,
     /// 11, 12, 13, 22, 23, 33.
-    pub(super) point: [N; 6],
-    pub(super) mixed: [[N; 3]; 3],
+    pub(crate) point: [N; 6],
+    pub(crate) mixed: [[N; 3]; 3],
     /// 11, 12, 13, 22, 23, 33.
-    pub(super) turn: [N; 6],
-    pub(super) slope: SlopeSums<N>,
+    pub(crate) turn: [N; 6],
+    pub(crate) slope: SlopeSums<N>,
 }
 
 /// `M` of a point; without distortion it has no 12.
 #[derive(Clone, Copy)]
-pub(super) struct Weight<N> {
-    pub(super) m11: N,
-    pub(super) m12: Option<N>,
-    pub(super) m13: N,
-    pub(super) m22: N,
-    pub(super) m23: N,
-    pub(super) m33: N,
+pub(crate) struct Weight<N> {
+    pub(crate) m11: N,
+    pub(crate) m12: Option<N>,
+    pub(crate) m13: N,
+    pub(crate) m22: N,
+    pub(crate) m23: N,
+    pub(crate) m33: N,
 }
 
 /// Sums over points of `a × s`, `s` and the squared residuals.
 #[derive(Clone, Copy)]
-pub(super) struct SlopeSums<N> {
-    pub(super) gradient: [N; 6],
-    pub(super) chi_squared: N,
-    pub(super) squared_residuals_px: N,
+pub(crate) struct SlopeSums<N> {
+    pub(crate) gradient: [N; 6],
+    pub(crate) chi_squared: N,
+    pub(crate) squared_residuals_px: N,
 }
 
 impl<N: Number> SlopeSums<N> {
     #[inline(always)]
-    pub(super) fn new(zero: N) -> Self {
+    pub(crate) fn new(zero: N) -> Self {
         Self {
             gradient: [zero; 6],
             chi_squared: zero,
@@ -47,7 +47,7 @@ impl<N: Number> SlopeSums<N> {
 
     /// Adds points: `a` their arms, `s` their `Dᵀ r`.
     #[inline(always)]
-    pub(super) fn add(&mut self, a: [N; 3], s: [N; 3]) {
+    pub(crate) fn add(&mut self, a: [N; 3], s: [N; 3]) {
         let [a1, a2, a3] = a;
         let g = &mut self.gradient;
         g[0] = g[0].plus(a2, s[2]).minus(a3, s[1]);
@@ -61,7 +61,7 @@ impl<N: Number> SlopeSums<N> {
 
 impl SlopeSums<f64> {
     #[inline(always)]
-    pub(super) fn finish(&self) -> Option<Slope> {
+    pub(crate) fn finish(&self) -> Option<Slope> {
         self.chi_squared.is_finite().then_some(Slope {
             gradient: self.gradient,
             chi_squared: self.chi_squared,
@@ -72,7 +72,7 @@ impl SlopeSums<f64> {
 
 impl<N: Number> Sums<N> {
     #[inline(always)]
-    pub(super) fn new(zero: N) -> Self {
+    pub(crate) fn new(zero: N) -> Self {
         Self {
             zero,
             point: [zero; 6],
@@ -84,7 +84,7 @@ impl<N: Number> Sums<N> {
 
     /// Adds points: `a` their arms, `m` their `M`, `s` their `Dᵀ r`.
     #[inline(always)]
-    pub(super) fn add(&mut self, a: [N; 3], m: Weight<N>, s: [N; 3]) {
+    pub(crate) fn add(&mut self, a: [N; 3], m: Weight<N>, s: [N; 3]) {
         let [a1, a2, a3] = a;
         let Weight {
             m11,
@@ -143,9 +143,10 @@ impl<N: Number> Sums<N> {
 
 impl Sums<f64> {
     #[inline(always)]
-    pub(super) fn finish(&self) -> Option<Linearised> {
+    pub(crate) fn finish(&self) -> Option<Linearised> {
         self.slope.finish().map(|slope| Linearised {
             slope,
+            kept: (),
             information: Information {
                 turn: self.turn,
                 mixed: self.mixed,
@@ -157,7 +158,7 @@ impl Sums<f64> {
 
 impl<A: Arithmetic> Sums<Four<A>> {
     #[inline(always)]
-    pub(super) fn total(&self) -> Sums<f64> {
+    pub(crate) fn total(&self) -> Sums<f64> {
         let [[a, b, c], [d, e, f], [g, h, i]] = self.mixed;
         let [a, b, c, d, e, f, g, h, i] = totals(&[a, b, c, d, e, f, g, h, i]);
         Sums {
@@ -172,7 +173,7 @@ impl<A: Arithmetic> Sums<Four<A>> {
 
 impl<A: Arithmetic> SlopeSums<Four<A>> {
     #[inline(always)]
-    pub(super) fn total(&self) -> SlopeSums<f64> {
+    pub(crate) fn total(&self) -> SlopeSums<f64> {
         let [a, b, c, d, e, f] = self.gradient;
         let [a, b, c, d, e, f, chi_squared, squared_residuals_px] = totals(&[
             a,

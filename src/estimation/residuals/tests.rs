@@ -223,7 +223,12 @@ impl Kernel for Linearise<'_> {
             points: self.points,
         };
         let linearised = residuals.linearise(self.pose).expect("in view");
-        (linearised, residuals.slope(self.pose).expect("in view"))
+        (
+            linearised,
+            residuals
+                .slope(self.pose, &linearised.kept)
+                .expect("in view"),
+        )
     }
 }
 

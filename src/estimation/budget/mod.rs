@@ -1,0 +1,291 @@
+//! The error budget: what else than the noise of single detections makes pixels differ from their prediction.
+//!
+//! Every cause has a standard deviation, stated by the user. Causes that many points share (a bent wing, a wrong
+//! focal length, an image that shakes) are *modes*: each is a vector of pixel shifts at one sigma. Survey errors
+//! belong to one marker each. The covariance of all pixels of a frame is then
+//!
+//! ```text
+//! Σ = diag(σᵢ²) + blockdiag(Dᵢ Sᵢ Dᵢᵀ) + Σₘ hₘ hₘᵀ,   Dᵢ = ∂pixel/∂point in the camera frame
+//! ```
+//!
+//! with `Sᵢ = sᵢ² 1` the survey covariance of marker `i`. Weights, covariance and chi-squared are those of the whole
+//! `Σ`. It is never formed: estimating the amplitude of every mode, with a prior of one sigma, and eliminating it
+//! gives the same, at a cost linear in the number of points.
+
+mod causes;
+mod frame;
+mod gram;
+mod in_doubt;
+mod residuals;
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use crate::camera::{CALIBRATION_SIZE, CalibrationChange};
+
+pub(super) use causes::frame_causes;
+pub use causes::{Cause, CauseKind, FrameCauses};
+pub(super) use frame::{AttitudePrior, FrameBudget};
+pub(super) use in_doubt::InDoubt;
+
+/// Most ways in which the airframe bends.
+pub const MAX_FLEX_MODES: usize = 4;
+/// Most modes of calibration and jitter together.
+const MAX_IMAGE_MODES: usize = 12;
+/// Most modes of all kinds.
+const MAX_MODES: usize = MAX_FLEX_MODES + MAX_IMAGE_MODES;
+
+/// A way in which the airframe bends: where each marker goes at one sigma.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexMode {
+    /// Its name, for reports.
+    pub name: String,
+    /// How long an amplitude lasts, s; `None`: for the whole flight.
+    pub time_constant_s: Option<f64>,
+    /// Marker id and displacement at one sigma, tanker frame, m. Markers that are not listed stay where they are.
+    pub shape: Vec<(u32, Vector3<f64>)>,
+}
+
+/// A direction in which the calibration may be wrong: its change at one sigma.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationMode {
+    /// Its name, for reports.
+    pub name: String,
+    /// The change of the calibration at one sigma.
+    pub change: CalibrationChange,
+}
+
+/// Standard deviations of all that a map, a calibration and a mount may have wrong, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorBudget {
+    flex: Vec<FlexMode>,
+    calibration: Vec<CalibrationMode>,
+    jitter_px: f64,
+    /// By id, ascending.
+    markers: Vec<MarkerBudget>,
+    image: Vec<ImageMode>,
+}
+
+/// What may be wrong with the place of one marker.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MarkerBudget {
+    id: u32,
+    /// Of each axis, m.
+    survey_sigma_m: f64,
+    /// Displacement at one sigma of each flex mode, m.
+    flex: [Vector3<f64>; MAX_FLEX_MODES],
+}
+
+/// A mode of the image: a weighted sum of the columns of `Camera::pixel_by_calibration`.
+#[derive(Debug, Clone, PartialEq)]
+struct ImageMode {
+    terms: Vec<(usize, f64)>,
+}
+
+/// Why standard deviations are no budget.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BudgetError {
+    /// A number that is no standard deviation.
+    #[error("expected a finite number of 0 or more for {of}, got {value}")]
+    Sigma {
+        /// What it is the sigma of.
+        of: String,
+        /// What came.
+        value: f64,
+    },
+    /// More modes than there is room for.
+    #[error("expected at most {most} modes of {kind}, got {got}")]
+    TooManyModes {
+        /// Which kind of mode.
+        kind: &'static str,
+        /// How many there may be.
+        most: usize,
+        /// How many came.
+        got: usize,
+    },
+}
+
+/// Column of the principal point's u in a calibration; v follows.
+const PRINCIPAL_POINT: usize = 2;
+
+impl ErrorBudget {
+    /// Returns the checked budget; all of it may be zero.
+    ///
+    /// # Inputs
+    /// * `survey`: marker id and standard deviation of each of its coordinates, m.
+    /// * `jitter_px`: standard deviation of a shift of the whole image, each frame another one, px.
+    ///
+    /// # Errors
+    /// [`BudgetError`]: a value that is negative or not finite, too many modes.
+    pub fn new(
+        survey: &[(u32, f64)],
+        flex: Vec<FlexMode>,
+        calibration: Vec<CalibrationMode>,
+        jitter_px: f64,
+    ) -> Result<Self, BudgetError> {
+        check(survey, &flex, &calibration, jitter_px)?;
+        let markers = markers(survey, &flex);
+        let image = image_modes(&calibration, jitter_px);
+        for (kind, most, got) in [
+            ("flex", MAX_FLEX_MODES, flex.len()),
+            ("calibration and jitter", MAX_IMAGE_MODES, image.len()),
+        ] {
+            if got > most {
+                return Err(BudgetError::TooManyModes { kind, most, got });
+            }
+        }
+        Ok(Self {
+            flex,
+            calibration,
+            jitter_px,
+            markers,
+            image,
+        })
+    }
+
+    /// Returns whether nothing is in doubt: then the estimate is that without a budget.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let is_exact = |marker: &MarkerBudget| {
+            marker.survey_sigma_m == 0.0
+                && marker.flex.iter().all(|shift| *shift == Vector3::zeros())
+        };
+        self.image.is_empty() && self.markers.iter().all(is_exact)
+    }
+
+    /// Returns the flex modes.
+    #[must_use]
+    pub fn flex(&self) -> &[FlexMode] {
+        &self.flex
+    }
+
+    /// Returns the calibration's modes.
+    #[must_use]
+    pub fn calibration(&self) -> &[CalibrationMode] {
+        &self.calibration
+    }
+
+    /// Returns the standard deviation of the shift of the whole image, px.
+    #[must_use]
+    pub fn jitter_px(&self) -> f64 {
+        self.jitter_px
+    }
+
+    /// Returns the standard deviation of each coordinate of a marker, m.
+    #[must_use]
+    pub fn survey_sigma_m(&self, id: u32) -> f64 {
+        self.marker(id, &mut 0)
+            .map_or(0.0, |marker| marker.survey_sigma_m)
+    }
+
+    /// Returns a marker's part. Markers mostly come in the map's order: `place` remembers where to look first.
+    #[inline(always)]
+    fn marker(&self, id: u32, place: &mut usize) -> Option<&MarkerBudget> {
+        if self
+            .markers
+            .get(*place)
+            .is_none_or(|marker| marker.id != id)
+        {
+            *place = self
+                .markers
+                .binary_search_by_key(&id, |marker| marker.id)
+                .ok()?;
+        }
+        let found = self.markers.get(*place);
+        *place += 1;
+        found
+    }
+}
+
+fn check(
+    survey: &[(u32, f64)],
+    flex: &[FlexMode],
+    calibration: &[CalibrationMode],
+    jitter_px: f64,
+) -> Result<(), BudgetError> {
+    let of_markers = survey
+        .iter()
+        .map(|(id, sigma)| (format!("the survey of marker {id}"), *sigma));
+    let of_flex = flex.iter().flat_map(|mode| {
+        let time = mode.time_constant_s.map(|time| {
+            (
+                format!("the time constant of flex mode `{}`", mode.name),
+                time,
+            )
+        });
+        let shape = mode.shape.iter().map(|(id, shift)| {
+            let of = format!("the shift of marker {id} in flex mode `{}`", mode.name);
+            (of, shift.norm())
+        });
+        time.into_iter().chain(shape)
+    });
+    let of_calibration = calibration.iter().map(|mode| {
+        let of = format!("the change of calibration mode `{}`", mode.name);
+        (of, mode.change.norm())
+    });
+    let jitter = std::iter::once(("the jitter of the image".to_owned(), jitter_px));
+    for (of, value) in of_markers
+        .chain(of_flex)
+        .chain(of_calibration)
+        .chain(jitter)
+    {
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(BudgetError::Sigma { of, value });
+        }
+    }
+    Ok(())
+}
+
+fn markers(survey: &[(u32, f64)], flex: &[FlexMode]) -> Vec<MarkerBudget> {
+    let mut markers = BTreeMap::new();
+    for &(id, survey_sigma_m) in survey {
+        entry(&mut markers, id).survey_sigma_m = survey_sigma_m;
+    }
+    for (index, mode) in flex.iter().enumerate().take(MAX_FLEX_MODES) {
+        for &(id, shift) in &mode.shape {
+            entry(&mut markers, id).flex[index] = shift;
+        }
+    }
+    markers.into_values().collect()
+}
+
+fn entry(markers: &mut BTreeMap<u32, MarkerBudget>, id: u32) -> &mut MarkerBudget {
+    markers.entry(id).or_insert(MarkerBudget {
+        id,
+        survey_sigma_m: 0.0,
+        flex: [Vector3::zeros(); MAX_FLEX_MODES],
+    })
+}
+
+/// Returns the modes of the image. A shaking image and a wrong principal point look the same in one frame: where the
+/// principal point has modes of its own, the jitter joins them.
+fn image_modes(calibration: &[CalibrationMode], jitter_px: f64) -> Vec<ImageMode> {
+    let mut jitter = [jitter_px; 2];
+    let mut modes = Vec::new();
+    for mode in calibration {
+        let mut terms: Vec<(usize, f64)> = (0..CALIBRATION_SIZE)
+            .filter(|&index| mode.change[index] != 0.0)
+            .map(|index| (index, mode.change[index]))
+            .collect();
+        if let [(index, sigma)] = terms.as_mut_slice()
+            && let Some(jitter) = index
+                .checked_sub(PRINCIPAL_POINT)
+                .and_then(|axis| jitter.get_mut(axis))
+        {
+            *sigma = sigma.hypot(*jitter);
+            *jitter = 0.0;
+        }
+        if !terms.is_empty() {
+            modes.push(ImageMode { terms });
+        }
+    }
+    for (axis, sigma) in jitter.into_iter().enumerate() {
+        if sigma > 0.0 {
+            let terms = vec![(PRINCIPAL_POINT + axis, sigma)];
+            modes.push(ImageMode { terms });
+        }
+    }
+    modes
+}

@@ -1,0 +1,135 @@
+//! A world that differs from what the estimator believes, drawn from an error budget.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::camera::{CalibrationChange, Camera, Ray};
+use crate::estimation::{ErrorBudget, Observation};
+use crate::target::Marker;
+
+/// The true camera and tanker beside the believed ones.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// The camera that makes the images.
+    camera: Camera,
+    /// As the map has them.
+    believed: Vec<Marker>,
+    /// Where they are on a tanker that is not bent.
+    surveyed: Vec<Point3<f64>>,
+    budget: ErrorBudget,
+    /// Amplitude of each flex mode in its sigmas.
+    flex_sigmas: Vec<f64>,
+}
+
+impl World {
+    /// Returns a world as a budget says that it may be: survey, calibration and flex are drawn once.
+    pub fn draw(
+        camera: &Camera,
+        markers: &[Marker],
+        budget: &ErrorBudget,
+        random: &mut impl Rng,
+    ) -> Self {
+        let surveyed = markers
+            .iter()
+            .map(|marker| {
+                let error = Vector3::from_fn(|_, _| normal(random));
+                marker.marker_in_tanker + error * budget.survey_sigma_m(marker.id)
+            })
+            .collect();
+        let change = budget
+            .calibration()
+            .iter()
+            .fold(CalibrationChange::zeros(), |change, mode| {
+                change + mode.change * normal(random)
+            });
+        let flex_sigmas = budget.flex().iter().map(|_| normal(random)).collect();
+        Self {
+            camera: camera.with_change(&change),
+            believed: markers.to_vec(),
+            surveyed,
+            budget: budget.clone(),
+            flex_sigmas,
+        }
+    }
+
+    /// Returns the camera that makes the images.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Returns the amplitude of each flex mode in its sigmas.
+    #[must_use]
+    pub fn flex_sigmas(&self) -> &[f64] {
+        &self.flex_sigmas
+    }
+
+    /// Sets the amplitudes of the flex modes, in their sigmas; modes that are not listed stay as they are.
+    pub fn set_flex(&mut self, sigmas: &[f64]) {
+        for (amplitude, sigma) in self.flex_sigmas.iter_mut().zip(sigmas) {
+            *amplitude = *sigma;
+        }
+    }
+
+    /// Lets time pass: flex modes with a time constant wander, with that constant and one sigma (a Gauss–Markov process
+    /// of first order).
+    pub fn advance(&mut self, seconds: f64, random: &mut impl Rng) {
+        for (amplitude, mode) in self.flex_sigmas.iter_mut().zip(self.budget.flex()) {
+            if let Some(time_constant_s) = mode.time_constant_s {
+                let kept = (-seconds / time_constant_s).exp();
+                *amplitude = kept * *amplitude + (1.0 - kept * kept).sqrt() * normal(random);
+            }
+        }
+    }
+
+    /// Returns a frame of this world: the true pixels with jitter and noise, beside the places that the map has.
+    /// Markers behind the camera or outside its lens model are missing.
+    pub fn observe(
+        &self,
+        camera_from_tanker: &Isometry3<f64>,
+        sigma_px: f64,
+        random: &mut impl Rng,
+    ) -> Vec<Observation> {
+        let jitter = [(); 2].map(|()| self.budget.jitter_px() * normal(random));
+        self.believed
+            .iter()
+            .zip(&self.surveyed)
+            .filter_map(|(marker, surveyed)| {
+                let noise = [(); 2].map(|()| sigma_px * normal(random));
+                let q = camera_from_tanker * (surveyed + self.flex_of(marker.id));
+                if q.z <= 0.0 {
+                    return None;
+                }
+                let ray = Ray {
+                    x: q.x / q.z,
+                    y: q.y / q.z,
+                };
+                let (mut pixel, _) = self.camera.project(ray)?;
+                pixel.u += jitter[0] + noise[0];
+                pixel.v += jitter[1] + noise[1];
+                Some(Observation {
+                    id: marker.id,
+                    marker_in_tanker: marker.marker_in_tanker,
+                    pixel,
+                    sigma_px,
+                })
+            })
+            .collect()
+    }
+
+    /// Returns where the bent airframe puts a marker, from where it sits when it is not bent, m.
+    fn flex_of(&self, id: u32) -> Vector3<f64> {
+        let modes = self.budget.flex().iter().zip(&self.flex_sigmas);
+        modes
+            .filter_map(|(mode, amplitude)| {
+                let (_, shift) = mode.shape.iter().find(|(marker, _)| *marker == id)?;
+                Some(shift * *amplitude)
+            })
+            .sum()
+    }
+}
+
+fn normal(random: &mut impl Rng) -> f64 {
+    StandardNormal.sample(random)
+}

@@ -1,0 +1,518 @@
+//! Worlds drawn from an error budget: the covariance covers survey, flex, calibration and jitter as it covers noise.
+//!
+//! Bounds follow from the number of trials. With N = 2000 the standard error of a mean NEES of six axes is
+//! sqrt(12/N) = 0.077 (5.7–6.3 is 3.9 of them), of three axes sqrt(6/N) = 0.055 (2.8–3.2: 3.7), that of a 95 % coverage
+//! 0.49 % (93.5–96.5 %: 3.1). Among 126 lines the largest of so many deviations is about 2.9.
+
+mod support;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
+use rand::RngExt;
+use rayon::prelude::*;
+use support::tanker_markers;
+use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo, Ray};
+use tanker_pose::estimation::{
+    CalibrationMode, CauseKind, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Observation,
+    Solution,
+};
+use tanker_pose::geometry::{pose_error, skew};
+use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
+use tanker_pose::target::{Marker, MarkerMap};
+
+const TRIALS: u32 = 2000;
+const SEED: u64 = 11;
+const SIGMA_PX: f64 = 0.5;
+/// 95 % quantiles of chi-squared with six and three degrees of freedom.
+const CHI_SQUARED_6_95: f64 = 12.591_587;
+const CHI_SQUARED_3_95: f64 = 7.814_728;
+/// m; a point at the tail, amid the markers.
+const TAIL: Vector3<f64> = Vector3::new(7.8, 0.0, 1.0);
+
+/// Standard deviations of a world.
+#[derive(Clone, Copy, Default)]
+struct Causes {
+    survey_m: f64,
+    /// Of the wing tips, upwards.
+    flex_m: f64,
+    /// A share.
+    focal: f64,
+    principal_point_px: f64,
+    k1: f64,
+    jitter_px: f64,
+}
+
+const EVERYTHING: Causes = Causes {
+    survey_m: 0.02,
+    flex_m: 0.3,
+    focal: 0.003,
+    principal_point_px: 3.0,
+    k1: 0.02,
+    jitter_px: 0.5,
+};
+
+impl Causes {
+    fn budget(&self, markers: &[Marker]) -> ErrorBudget {
+        let survey: Vec<(u32, f64)> = markers.iter().map(|m| (m.id, self.survey_m)).collect();
+        let bend = |marker: &Marker| {
+            let up = self.flex_m * (marker.marker_in_tanker.y / 7.13).powi(2);
+            (marker.id, Vector3::new(0.0, 0.0, up))
+        };
+        let flex = FlexMode {
+            name: "wing_bending".to_owned(),
+            time_constant_s: None,
+            shape: markers.iter().map(bend).collect(),
+        };
+        let calibration = [
+            ("focal_length", [0, 1].as_slice(), self.focal),
+            ("principal_point_u", &[2], self.principal_point_px),
+            ("principal_point_v", &[3], self.principal_point_px),
+            ("k1", &[4], self.k1),
+        ]
+        .into_iter()
+        .filter(|(_, _, sigma)| *sigma > 0.0)
+        .map(|(name, places, sigma)| {
+            let mut change = CalibrationChange::zeros();
+            for &place in places {
+                change[place] = sigma;
+            }
+            CalibrationMode {
+                name: name.to_owned(),
+                change,
+            }
+        })
+        .collect();
+        let flex = if self.flex_m > 0.0 {
+            vec![flex]
+        } else {
+            vec![]
+        };
+        ErrorBudget::new(&survey, flex, calibration, self.jitter_px).expect("a budget")
+    }
+}
+
+#[derive(Default, Clone, Copy)]
+struct Tally {
+    trials: f64,
+    trusted: f64,
+    nees: f64,
+    covered: f64,
+    nees_at_tail: f64,
+    covered_at_tail: f64,
+    beyond_30: f64,
+}
+
+impl Tally {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            trials: self.trials + other.trials,
+            trusted: self.trusted + other.trusted,
+            nees: self.nees + other.nees,
+            covered: self.covered + other.covered,
+            nees_at_tail: self.nees_at_tail + other.nees_at_tail,
+            covered_at_tail: self.covered_at_tail + other.covered_at_tail,
+            beyond_30: self.beyond_30 + other.beyond_30,
+        }
+    }
+
+    /// Means over the trusted frames; shares in percent.
+    fn report(self, name: &str) -> Self {
+        let n = self.trusted;
+        let means = Self {
+            trials: self.trials,
+            trusted: 100.0 * n / self.trials,
+            nees: self.nees / n,
+            covered: 100.0 * self.covered / n,
+            nees_at_tail: self.nees_at_tail / n,
+            covered_at_tail: 100.0 * self.covered_at_tail / n,
+            beyond_30: 100.0 * self.beyond_30 / n,
+        };
+        println!(
+            "{name:32} trusted {:6.2} %, NEES {:5.2}, 95 %: {:5.2}; tail {:4.2}, 95 %: {:5.2}; m² > 30: {:.2} %",
+            means.trusted,
+            means.nees,
+            means.covered,
+            means.nees_at_tail,
+            means.covered_at_tail,
+            means.beyond_30
+        );
+        means
+    }
+}
+
+/// Frames of worlds drawn anew each; `adjust` may set what was drawn.
+fn monte_carlo(
+    markers: &[Marker],
+    range_m: u16,
+    budget: &ErrorBudget,
+    estimator: &Estimator,
+    adjust: impl Fn(&mut World) + Sync,
+) -> Tally {
+    let camera = paper_camera();
+    let count = u16::try_from(markers.len()).expect("few");
+    let ahead_m = f64::from(range_m);
+    (0..TRIALS)
+        .into_par_iter()
+        .map(|trial| {
+            let mut random = trial_generator(SEED, count, range_m, trial);
+            let mut angle = || random.random_range(-3.0..3.0);
+            let (roll, pitch, yaw) = (angle(), angle(), angle());
+            let aside = Vector3::new(0.0, 0.3 * angle(), 0.3 * ahead_m + 0.3 * angle());
+            let ahead = Vector3::new(ahead_m, 0.0, 0.0);
+            let pose = pose_in_camera(ahead + aside, roll, pitch, yaw);
+            let mut world = World::draw(&camera, markers, budget, &mut random);
+            adjust(&mut world);
+            let seen = world.observe(&pose, SIGMA_PX, &mut random);
+            let mut tally = Tally {
+                trials: 1.0,
+                ..Tally::default()
+            };
+            let Ok(found) = estimator.estimate(&camera, &seen, None) else {
+                return tally;
+            };
+            if !is_flown(&found) {
+                return tally;
+            }
+            let error = pose_error(&found.camera_from_tanker, &pose);
+            let nees = found
+                .covariance
+                .mahalanobis_squared(&error)
+                .expect("positive definite");
+            let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
+            by_pose.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+            let arm = found.camera_from_tanker.rotation * TAIL;
+            by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(arm));
+            let covariance: Matrix3<f64> = by_pose * found.covariance.0 * by_pose.transpose();
+            let off = by_pose * error;
+            let at_tail = off.dot(&(covariance.try_inverse().expect("definite") * off));
+            let share = |is: bool| if is { 1.0 } else { 0.0 };
+            tally.trusted = 1.0;
+            tally.nees = nees;
+            tally.covered = share(nees < CHI_SQUARED_6_95);
+            tally.nees_at_tail = at_tail;
+            tally.covered_at_tail = share(at_tail < CHI_SQUARED_3_95);
+            tally.beyond_30 = share(nees > 30.0);
+            tally
+        })
+        .reduce(Tally::default, Tally::plus)
+}
+
+/// Whether the node would publish it.
+fn is_flown(solution: &Solution) -> bool {
+    solution.is_trusted() && solution.ambiguity <= EstimatorSettings::default().max_ambiguity
+}
+
+fn estimator(budget: ErrorBudget) -> Estimator {
+    Estimator::new(EstimatorSettings::default()).with_budget(budget)
+}
+
+#[test]
+fn worlds_drawn_from_the_budget_are_covered() {
+    let nothing = Causes::default();
+    let worlds = [
+        (
+            "survey 2 cm",
+            Causes {
+                survey_m: 0.02,
+                ..nothing
+            },
+        ),
+        (
+            "flex 0.3 m",
+            Causes {
+                flex_m: 0.3,
+                ..nothing
+            },
+        ),
+        (
+            "focal length 0.3 %",
+            Causes {
+                focal: 0.003,
+                ..nothing
+            },
+        ),
+        (
+            "principal point 3 px",
+            Causes {
+                principal_point_px: 3.0,
+                ..nothing
+            },
+        ),
+        (
+            "k1 0.02",
+            Causes {
+                k1: 0.02,
+                ..nothing
+            },
+        ),
+        (
+            "jitter 0.5 px",
+            Causes {
+                jitter_px: 0.5,
+                ..nothing
+            },
+        ),
+        ("everything", EVERYTHING),
+    ];
+    for count in [6, 8, 12] {
+        let markers = tanker_markers(count);
+        for range_m in [15, 30, 60] {
+            for (name, causes) in &worlds {
+                let budget = causes.budget(&markers);
+                let with_budget = estimator(budget.clone());
+                let name = format!("{count:2} points, {range_m} m, {name}");
+                let means =
+                    monte_carlo(&markers, range_m, &budget, &with_budget, |_| {}).report(&name);
+                assert!((5.7..6.3).contains(&means.nees), "{name}: {}", means.nees);
+                assert!(
+                    (2.8..3.2).contains(&means.nees_at_tail),
+                    "{name}: {}",
+                    means.nees_at_tail
+                );
+                for covered in [means.covered, means.covered_at_tail] {
+                    assert!((93.5..96.5).contains(&covered), "{name}: {covered}");
+                }
+                assert!(means.trusted >= 99.5, "{name}: {}", means.trusted);
+                assert!(means.beyond_30 <= 0.3, "{name}: {}", means.beyond_30);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_bent_wing_is_covered_from_none_to_two_sigmas() {
+    for count in [6, 12] {
+        let markers = tanker_markers(count);
+        let budget = Causes {
+            flex_m: 0.3,
+            ..Causes::default()
+        }
+        .budget(&markers);
+        for flex_m in [0.0, 0.1, 0.3, 0.6] {
+            let name = format!("{count:2} points, 15 m, tips up {flex_m} m");
+            let set = |world: &mut World| world.set_flex(&[flex_m / 0.3]);
+            let means =
+                monte_carlo(&markers, 15, &budget, &estimator(budget.clone()), set).report(&name);
+            assert!(means.nees <= 6.5, "{name}: {}", means.nees);
+            assert!(means.trusted >= 99.5, "{name}: {}", means.trusted);
+        }
+    }
+}
+
+/// What it is for: the same worlds, taken as exact.
+#[test]
+fn without_the_budget_the_same_worlds_are_not_covered() {
+    let markers = tanker_markers(6);
+    let budget = EVERYTHING.budget(&markers);
+    let unaware = Estimator::new(EstimatorSettings::default());
+    let means = monte_carlo(&markers, 15, &budget, &unaware, |_| {}).report("everything, unaware");
+    assert!(means.nees > 100.0, "{}", means.nees);
+}
+
+fn frame(
+    camera: &Camera,
+    budget: &ErrorBudget,
+    markers: &[Marker],
+    trial: u32,
+) -> Vec<Observation> {
+    let mut random = trial_generator(SEED, 100, 0, trial);
+    let pose = pose_in_camera(Vector3::new(18.0, 0.5, 5.0), 2.0, -1.0, 3.0);
+    World::draw(camera, markers, budget, &mut random).observe(&pose, SIGMA_PX, &mut random)
+}
+
+#[test]
+fn an_empty_budget_changes_no_bit() {
+    let markers = tanker_markers(12);
+    let nothing = Causes::default().budget(&markers);
+    let plain = Estimator::new(EstimatorSettings::default());
+    let with_empty = plain.clone().with_budget(nothing);
+    assert!(with_empty.budget().is_none());
+    for trial in 0..100 {
+        let seen = frame(
+            &paper_camera(),
+            &EVERYTHING.budget(&markers),
+            &markers,
+            trial,
+        );
+        let both = [&plain, &with_empty].map(|e| e.estimate(&paper_camera(), &seen, None));
+        assert_eq!(both[0], both[1]);
+    }
+}
+
+fn lens() -> Camera {
+    let info = CameraInfo {
+        width: 508,
+        height: 412,
+        distortion_model: "plumb_bob".to_owned(),
+        d: vec![-0.28, 0.09, 0.0008, -0.0005, -0.012],
+        k: [571.0, 0.0, 254.0, 0.0, 560.0, 206.0, 0.0, 0.0, 1.0],
+        ..CameraInfo::default()
+    };
+    Camera::from_info(&info, false).expect("a usual lens")
+}
+
+/// The whole covariance of a frame's pixels, formed as the definition says, and the estimate's own numbers from it.
+/// They differ by what the estimator takes from nearby: the calibration's derivatives from the seen pixel instead of the
+/// predicted one, the weights from up to a step before the end.
+#[test]
+fn estimate_agrees_with_the_whole_covariance_of_the_pixels() {
+    for camera in [paper_camera(), lens()] {
+        for count in [6, 9, 12] {
+            let markers = tanker_markers(count);
+            let budget = EVERYTHING.budget(&markers);
+            let estimator = estimator(budget.clone());
+            for trial in 0..20 {
+                let seen = frame(&camera, &budget, &markers, trial);
+                let found = estimator.estimate(&camera, &seen, None).expect("a pose");
+                let (chi_squared, covariance, gradient) = dense(&camera, &budget, &seen, &found);
+                let off = (found.chi_squared - chi_squared).abs();
+                assert!(off < 0.01 * (1.0 + chi_squared), "{off} of {chi_squared}");
+                let off = (found.covariance.0 - covariance).norm() / covariance.norm();
+                assert!(off < 0.05, "{off}");
+                // Half the gradient in units of sigma: what one more step would still do.
+                let rest = gradient.dot(&(covariance * gradient)).sqrt();
+                assert!(rest < 0.05, "{rest}");
+            }
+        }
+    }
+}
+
+/// Chi-squared, covariance of the pose and half the gradient with `Σ` as one matrix.
+fn dense(
+    camera: &Camera,
+    budget: &ErrorBudget,
+    seen: &[Observation],
+    found: &Solution,
+) -> (f64, Matrix6<f64>, nalgebra::Vector6<f64>) {
+    let n = seen.len();
+    let pose = &found.camera_from_tanker;
+    let mut residual = DVector::zeros(2 * n);
+    let mut by_pose = DMatrix::zeros(2 * n, 6);
+    let mut sigma = DMatrix::zeros(2 * n, 2 * n);
+    let mut modes = DMatrix::zeros(2 * n, budget.flex().len() + budget.calibration().len() + 2);
+    for (i, point) in seen.iter().enumerate() {
+        let q = pose * point.marker_in_tanker;
+        let ray = |q: nalgebra::Point3<f64>| Ray {
+            x: q.x / q.z,
+            y: q.y / q.z,
+        };
+        let (pixel, by_ray) = camera.project(ray(q)).expect("seen");
+        residual[2 * i] = pixel.u - point.pixel.u;
+        residual[2 * i + 1] = pixel.v - point.pixel.v;
+        let r = ray(q);
+        let d = by_ray * SMatrix::<f64, 2, 3>::new(1.0, 0.0, -r.x, 0.0, 1.0, -r.y) / q.z;
+        let arm = pose.rotation * point.marker_in_tanker.coords;
+        by_pose.view_mut((2 * i, 0), (2, 3)).copy_from(&d);
+        by_pose
+            .view_mut((2 * i, 3), (2, 3))
+            .copy_from(&(-d * skew(arm)));
+        let survey = d * d.transpose() * budget.survey_sigma_m(point.id).powi(2);
+        let own = survey + nalgebra::Matrix2::identity() * point.sigma_px.powi(2);
+        sigma.view_mut((2 * i, 2 * i), (2, 2)).copy_from(&own);
+        let mut column = 0;
+        for mode in budget.flex() {
+            let (_, shift) = mode
+                .shape
+                .iter()
+                .find(|(id, _)| *id == point.id)
+                .expect("all");
+            let shift = d * (pose.rotation * shift);
+            modes.view_mut((2 * i, column), (2, 1)).copy_from(&shift);
+            column += 1;
+        }
+        for mode in budget.calibration() {
+            // By differences, where the point was predicted.
+            let step = 1e-5;
+            let moved = camera.with_change(&(mode.change * step));
+            let (there, _) = moved.project(r).expect("seen");
+            modes[(2 * i, column)] = (there.u - pixel.u) / step;
+            modes[(2 * i + 1, column)] = (there.v - pixel.v) / step;
+            column += 1;
+        }
+        modes[(2 * i, column)] = budget.jitter_px();
+        modes[(2 * i + 1, column + 1)] = budget.jitter_px();
+    }
+    sigma += &modes * modes.transpose();
+    let factor = sigma.cholesky().expect("positive definite");
+    let chi_squared = residual.dot(&factor.solve(&residual));
+    let information = by_pose.transpose() * factor.solve(&by_pose);
+    let gradient = by_pose.transpose() * factor.solve(&residual);
+    let information = Matrix6::from_iterator(information.iter().copied());
+    let covariance = information.try_inverse().expect("a fixed pose");
+    (
+        chi_squared,
+        covariance,
+        nalgebra::Vector6::from_iterator(gradient.iter().copied()),
+    )
+}
+
+#[test]
+fn shares_of_the_causes_add_up_and_a_large_flex_is_found() {
+    let markers = tanker_markers(12);
+    let budget = EVERYTHING.budget(&markers);
+    let estimator = estimator(budget.clone());
+    let mut random = trial_generator(SEED, 101, 0, 0);
+    let pose = pose_in_camera(Vector3::new(15.0, 0.0, 4.5), 2.0, -1.0, 3.0);
+    let mut world = World::draw(&paper_camera(), &markers, &budget, &mut random);
+    world.set_flex(&[2.0]);
+    let seen = world.observe(&pose, SIGMA_PX, &mut random);
+    let found = estimator
+        .estimate(&paper_camera(), &seen, None)
+        .expect("a pose");
+    let causes = estimator
+        .causes(&paper_camera(), &seen, &found)
+        .expect("causes");
+    let names: Vec<&str> = causes
+        .causes
+        .iter()
+        .map(|cause| cause.name.as_str())
+        .collect();
+    let expected = [
+        "noise",
+        "survey",
+        "wing_bending",
+        "focal_length",
+        "principal_point_u",
+        "principal_point_v",
+        "k1",
+        "jitter_u",
+        "jitter_v",
+    ];
+    assert_eq!(names, expected);
+    let sum: Matrix6<f64> = causes.causes.iter().map(|cause| cause.covariance.0).sum();
+    assert!((sum - found.covariance.0).norm() < 0.01 * found.covariance.0.norm());
+    let flex = &causes.causes[2];
+    assert_eq!(
+        flex.kind,
+        CauseKind::Flex {
+            time_constant_s: None
+        }
+    );
+    let amplitude = flex.amplitude_sigmas.expect("one number");
+    assert!((1.0..3.0).contains(&amplitude), "{amplitude}");
+    assert_eq!(causes.survey_shifts.len(), 12);
+    // A principal point off by 3 px at 15 m is 8 cm aside: nothing else comes near.
+    assert!(
+        causes
+            .dominant()
+            .is_some_and(|cause| cause.name.starts_with("principal_point"))
+    );
+}
+
+/// `fin6` tells its range to the flex hardly: documented, not promised.
+#[test]
+fn fin6_with_flex_says_that_it_knows_little() {
+    let map = MarkerMap::shipped("fin6").expect("shipped");
+    let markers = map.markers().to_vec();
+    let budget = Causes {
+        flex_m: 0.3,
+        ..Causes::default()
+    }
+    .budget(&markers);
+    for (flex_m, most) in [(0.0, 6.5), (0.1, 6.5), (0.3, 7.5), (0.6, 11.0)] {
+        let name = format!("fin6, 15 m, tips up {flex_m} m");
+        let set = |world: &mut World| world.set_flex(&[flex_m / 0.3]);
+        let means =
+            monte_carlo(&markers, 15, &budget, &estimator(budget.clone()), set).report(&name);
+        assert!(means.nees < most, "{name}: {}", means.nees);
+    }
+}
