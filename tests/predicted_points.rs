@@ -13,7 +13,7 @@ use flight::{Frame, RATE_HZ, SIGMA_PX, drawn, rough_approach};
 use nalgebra::{Rotation3, Vector2, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use tanker_pose::camera::{CameraInfo, RegionOfInterest};
-use tanker_pose::config::{Configuration, Parameters, Settings};
+use tanker_pose::config::{Configuration, Parameters, Settings, TABLE};
 use tanker_pose::estimation::Observation;
 use tanker_pose::pipeline::{
     Detection, DetectionFrame, OutcomeCode, Pipeline, PredictedPoint, Stamp,
@@ -41,7 +41,7 @@ fn settings(track: Option<FilterSettings>) -> Settings {
     Settings {
         track,
         pixel_sigma_px: SIGMA_PX,
-        ..Configuration::from(&Parameters::default()).settings
+        ..Configuration::from(&Parameters::new(TABLE)).settings
     }
 }
 

@@ -1,22 +1,14 @@
 //! A raw value against its parameter's line in the table.
 
-use super::table::{FRAME_ID, Kind, ParameterSpec, TABLE, TEXT};
+use super::spec::{FRAME_ID, Kind, ParameterSpec, TEXT};
 use super::{ParameterError, ParameterValue};
 use crate::text::MAX_NAME_BYTES;
 
-/// Returns the table's own name, and the value in the type that the table gives it.
-pub(super) fn checked(
-    name: &str,
+/// Returns the value in the type that the parameter has.
+pub(super) fn check(
+    spec: &ParameterSpec,
     value: ParameterValue,
-) -> Result<(&'static str, ParameterValue), ParameterError> {
-    let spec = ParameterSpec::find(name).ok_or_else(|| ParameterError::Unknown {
-        name: name.to_owned(),
-        suggestion: nearest_name(name),
-    })?;
-    Ok((spec.name, check(spec, value)?))
-}
-
-fn check(spec: &ParameterSpec, value: ParameterValue) -> Result<ParameterValue, ParameterError> {
+) -> Result<ParameterValue, ParameterError> {
     use ParameterValue::{Bool, Double, Integer, String};
     let name = spec.name;
     match (spec.kind, value) {
@@ -117,8 +109,8 @@ const fn type_name(kind: Kind) -> &'static str {
 }
 
 /// Returns the parameter that was perhaps meant: the nearest, if a third of its letters at most differ.
-pub(crate) fn nearest_name(name: &str) -> Option<&'static str> {
-    TABLE
+pub(super) fn nearest_name(table: &'static [ParameterSpec], name: &str) -> Option<&'static str> {
+    table
         .iter()
         .map(|spec| (edit_distance(name, spec.name), spec.name))
         .filter(|(distance, known)| *distance * 3 <= known.len())

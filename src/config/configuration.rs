@@ -175,7 +175,7 @@ mod tests {
     const ROUNDING: f64 = 1e-15;
 
     fn configuration(changes: &[(&str, crate::config::ParameterValue)]) -> Configuration {
-        let mut parameters = Parameters::default();
+        let mut parameters = Parameters::new(crate::config::TABLE);
         for (name, value) in changes {
             parameters
                 .set(name, value.clone())

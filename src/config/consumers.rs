@@ -201,7 +201,7 @@ mod tests {
     use nalgebra::Vector3;
 
     fn found(changes: &[(&str, ParameterValue)]) -> ConsumerConfiguration {
-        let mut parameters = Parameters::default();
+        let mut parameters = Parameters::new(crate::config::TABLE);
         for (name, value) in changes {
             parameters
                 .set(name, value.clone())

@@ -8,14 +8,19 @@ mod check;
 mod configuration;
 mod consumers;
 mod parameters;
+#[cfg(test)]
+pub(crate) mod sample;
+mod spec;
 mod table;
+#[cfg(test)]
+mod tests;
 mod value;
 
-pub(crate) use check::nearest_name;
 pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
 pub use consumers::{AttitudeSource, ConsumerConfiguration, OutputError};
 pub use parameters::Parameters;
-pub use table::{Kind, ParameterSpec, TABLE};
+pub use spec::{Kind, ParameterSpec};
+pub use table::TABLE;
 pub use value::{ParameterError, ParameterValue};
 
 use crate::estimation::EstimatorSettings;
@@ -34,4 +39,13 @@ pub struct Settings {
     pub rectified: bool,
     /// Track settings; `None` disables tracking. Settings out of the filter's ranges disable it too: the table allows none.
     pub track: Option<FilterSettings>,
+}
+
+/// Checks values that are allowed one by one, but perhaps not together: what one output needs, another parameter may
+/// take away.
+///
+/// # Errors
+/// [`OutputError`] names the output.
+pub fn check_together(parameters: &Parameters) -> Result<(), OutputError> {
+    ConsumerConfiguration::from(parameters).check()
 }

@@ -58,4 +58,6 @@ mod scalar;
 mod serve;
 pub mod service;
 pub mod start_values;
+#[cfg(test)]
+mod tests;
 mod understood;

@@ -29,7 +29,7 @@ use super::qos_overrides::{Endpoint, QosOverrides, Role};
 use super::reset::ResetService;
 use super::serve::Server;
 use super::start_values::{StartParameterError, StartValues, start_values};
-use crate::config::{AttitudeSource, Configuration};
+use crate::config::{self, AttitudeSource, Configuration, Parameters, TABLE};
 use crate::pipeline::Pipeline;
 use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
@@ -157,7 +157,9 @@ pub fn run_until(
         log::warn!("{warning}");
     }
     ros.override_qos(start.qos.clone());
-    let (parameters, changes) = SharedParameters::new(start.parameters, &start.qos);
+    let (parameters, changes) = SharedParameters::new(start.parameters, &start.qos, |changed| {
+        config::check_together(changed).map_err(|error| error.to_string())
+    });
     let clock = NodeClock::default();
     let mut server = Server::new(&mut ros, environment, &parameters, &clock);
     let served = server
@@ -195,7 +197,12 @@ pub fn run_until(
 pub fn effective_parameters(arguments: &Arguments) -> Result<(NodeNames, StartValues), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
     let qos = QosOverrides::new(endpoints(&names)?);
-    let start = start_values(arguments, &names.fully_qualified(), qos)?;
+    let start = start_values(
+        arguments,
+        &names.fully_qualified(),
+        Parameters::new(TABLE),
+        qos,
+    )?;
     Ok((names, start))
 }
 

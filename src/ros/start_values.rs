@@ -4,7 +4,7 @@ use super::arguments::Arguments;
 use super::overrides::{Override, Overrides, Place};
 use super::parameter_file::ParameterFileError;
 use super::qos_overrides::{self, QosOverrideError, QosOverrides};
-use crate::config::{ParameterError, ParameterSpec, ParameterValue, Parameters, nearest_name};
+use crate::config::{ParameterError, ParameterValue, Parameters};
 use crate::text::clip;
 
 /// Why the parameters given at the start cannot be used.
@@ -67,18 +67,19 @@ pub struct StartValues {
     pub warnings: Vec<String>,
 }
 
-/// Returns the parameters of the node with this absolute name: defaults, overridden by files and `-p` in the order that
-/// [`Overrides`] says; and so with `qos`.
+/// Returns the parameters of the node with this absolute name: `parameters`, overridden by files and `-p` in the order
+/// that [`Overrides`] says; and so with `qos`.
 ///
 /// # Errors
 /// [`StartParameterError`] names the parameter, and the file and line that it stands in.
 pub fn start_values(
     arguments: &Arguments,
     node: &str,
+    parameters: Parameters,
     qos: QosOverrides,
 ) -> Result<StartValues, StartParameterError> {
     let mut found = StartValues {
-        parameters: Parameters::default(),
+        parameters,
         qos,
         warnings: Vec::new(),
     };
@@ -90,7 +91,7 @@ pub fn start_values(
         ));
     }
     for given in overrides.repetitions {
-        if !given.is_shared || is_known(&given.name) {
+        if !given.is_shared || found.is_known(&given.name) {
             return Err(StartParameterError::Repeated {
                 place: given.place,
                 name: clip(&given.name),
@@ -101,46 +102,15 @@ pub fn start_values(
     let mut of_others = Vec::new();
     for given in overrides.values {
         // Below a pattern stand the parameters of many nodes.
-        if given.is_shared && !is_known(&given.name) {
+        if given.is_shared && !found.is_known(&given.name) {
             of_others.push(given);
         } else {
             found.take(given)?;
         }
     }
-    found.warnings.extend(warnings_of_unknown(&of_others));
+    let warnings = found.warnings_of_unknown(&of_others);
+    found.warnings.extend(warnings);
     Ok(found)
-}
-
-fn is_known(name: &str) -> bool {
-    name.starts_with(qos_overrides::PREFIX) || ParameterSpec::find(name).is_some()
-}
-
-/// Returns one warning for each name that is close to one of ours, and one for all the others.
-fn warnings_of_unknown(given: &[Override]) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let mut far = Vec::new();
-    for given in given {
-        match nearest_name(&given.name) {
-            Some(close) => warnings.push(format!(
-                "{}: this node has no parameter {:?}, is {close} meant?",
-                given.place,
-                clip(&given.name)
-            )),
-            None => far.push(given),
-        }
-    }
-    if let Some((first, others)) = far.split_first() {
-        let others = match others.len() {
-            0 => String::new(),
-            count => format!(", nor {count} others that files set for several nodes"),
-        };
-        warnings.push(format!(
-            "{}: this node has no parameter {:?}{others}",
-            first.place,
-            clip(&first.name)
-        ));
-    }
-    warnings
 }
 
 impl StartValues {
@@ -152,6 +122,38 @@ impl StartValues {
                 clip(&name)
             ));
         }
+    }
+
+    fn is_known(&self, name: &str) -> bool {
+        name.starts_with(qos_overrides::PREFIX) || self.parameters.spec(name).is_some()
+    }
+
+    /// Returns one warning for each name that is close to one of the node's, and one for all the others.
+    fn warnings_of_unknown(&self, given: &[Override]) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let mut far = Vec::new();
+        for given in given {
+            match self.parameters.nearest_name(&given.name) {
+                Some(close) => warnings.push(format!(
+                    "{}: this node has no parameter {:?}, is {close} meant?",
+                    given.place,
+                    clip(&given.name)
+                )),
+                None => far.push(given),
+            }
+        }
+        if let Some((first, others)) = far.split_first() {
+            let others = match others.len() {
+                0 => String::new(),
+                count => format!(", nor {count} others that files set for several nodes"),
+            };
+            warnings.push(format!(
+                "{}: this node has no parameter {:?}{others}",
+                first.place,
+                clip(&first.name)
+            ));
+        }
+        warnings
     }
 
     fn take(&mut self, given: Override) -> Result<(), StartParameterError> {
@@ -187,13 +189,10 @@ impl StartValues {
 
 #[cfg(test)]
 mod tests {
-    use std::path::{Path, PathBuf};
-
-    use super::super::parameter_file;
     use super::super::participant::reliable;
     use super::super::qos_overrides::{Endpoint, Role};
     use super::*;
-    use crate::config::TABLE;
+    use crate::config::sample::SAMPLE;
 
     fn arguments(arguments: &[&str]) -> Arguments {
         let all: Vec<String> = ["--ros-args"]
@@ -206,78 +205,45 @@ mod tests {
             .0
     }
 
-    fn shipped_file() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("config/tanker_pose.yaml")
-    }
-
-    #[test]
-    fn shipped_parameter_file_lists_the_table_and_its_defaults() {
-        let sections = parameter_file::read(&shipped_file()).expect("the shipped file is valid");
-        assert_eq!(sections[0].pattern, "/**");
-        let section = &sections[0].parameters;
-        let mut listed: Vec<&str> = section.iter().map(|p| p.name.as_str()).collect();
-        listed.sort_unstable();
-        let mut table: Vec<&str> = TABLE.iter().map(|spec| spec.name).collect();
-        table.sort_unstable();
-        assert_eq!(listed, table);
-        for parameter in section {
-            let spec = TABLE
-                .iter()
-                .find(|spec| spec.name == parameter.name)
-                .expect("just compared");
-            assert_eq!(parameter.value, Some(spec.default()), "{}", parameter.name);
-        }
+    fn started(arguments: &Arguments, node: &str) -> Result<StartValues, StartParameterError> {
+        let parameters = Parameters::new(SAMPLE);
+        start_values(arguments, node, parameters, QosOverrides::default())
     }
 
     #[test]
     fn arguments_override_files_and_files_override_defaults() {
-        let path = shipped_file();
-        let path = path.to_str().expect("the path is text");
-        let given = arguments(&[
-            "-p",
-            "max_outliers:=1",
-            "--params-file",
-            path,
-            "-p",
-            "pixel_sigma_px:=1",
-        ]);
-        let found = start_values(&given, "/uav1/tanker_pose", QosOverrides::default())
-            .expect("valid")
-            .parameters;
-        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
-        assert_eq!(
-            found.get("pixel_sigma_px"),
-            Some(&ParameterValue::Double(1.0))
-        );
-        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(5)));
+        let path = std::env::temp_dir().join(format!("start_values_{}.yaml", std::process::id()));
+        let text = "/**:\n  ros__parameters:\n    retries: 2\n    rate_hz: 20\n";
+        std::fs::write(&path, text).expect("the directory for temporary files is writable");
+        let name = path.to_str().expect("the path is text");
+        let given = arguments(&["--params-file", name, "-p", "rate_hz:=1"]);
+        let found = started(&given, "/left/sensor");
+        std::fs::remove_file(&path).expect("it was just written");
+        let found = found.expect("valid").parameters;
+        assert_eq!(found.get("retries"), Some(&ParameterValue::Integer(2)));
+        assert_eq!(found.get("rate_hz"), Some(&ParameterValue::Double(1.0)));
+        assert_eq!(found.get("min_samples"), Some(&ParameterValue::Integer(5)));
     }
 
     #[test]
     fn argument_for_another_node_is_passed_over() {
-        let given = arguments(&[
-            "-p",
-            "other:max_outliers:=2",
-            "-p",
-            "tanker_pose:min_points:=6",
-        ]);
-        let found = start_values(&given, "/tanker_pose", QosOverrides::default())
-            .expect("valid")
-            .parameters;
-        assert_eq!(found.get("max_outliers"), Some(&ParameterValue::Integer(1)));
-        assert_eq!(found.get("min_points"), Some(&ParameterValue::Integer(6)));
+        let given = arguments(&["-p", "other:retries:=2", "-p", "sensor:min_samples:=6"]);
+        let found = started(&given, "/sensor").expect("valid").parameters;
+        assert_eq!(found.get("retries"), Some(&ParameterValue::Integer(1)));
+        assert_eq!(found.get("min_samples"), Some(&ParameterValue::Integer(6)));
     }
 
     #[test]
     fn wrong_arguments_are_refused_by_name() {
         for (argument, name) in [
-            ("max_outlier:=1", "max_outliers"),
-            ("max_outliers:=3", "max_outliers"),
-            ("max_outliers:=[1]", "max_outliers"),
-            ("pixel_sigma_px:=.nan", "pixel_sigma_px"),
-            ("rectified:=~", "rectified"),
+            ("retrie:=1", "retries"),
+            ("retries:=3", "retries"),
+            ("retries:=[1]", "retries"),
+            ("rate_hz:=.nan", "rate_hz"),
+            ("filtered:=~", "filtered"),
         ] {
             let given = arguments(&["-p", argument]);
-            let refused = start_values(&given, "/n", QosOverrides::default()).expect_err(argument);
+            let refused = started(&given, "/n").expect_err(argument);
             assert!(refused.to_string().contains(name), "{argument}: {refused}");
         }
     }
@@ -292,7 +258,8 @@ mod tests {
             "-p",
             "qos_overrides./image.publisher.depth:=2",
         ]);
-        let found = start_values(&given, "/n", qos.clone()).expect("valid");
+        let found =
+            start_values(&given, "/n", Parameters::new(SAMPLE), qos.clone()).expect("valid");
         let default = reliable(50);
         assert_eq!(
             found.qos.profile("/pose", Role::Publisher, &default),
@@ -317,7 +284,8 @@ mod tests {
         );
 
         let given = arguments(&["-p", "qos_overrides./pose.publisher.depth:=none"]);
-        let refused = start_values(&given, "/n", qos).expect_err("a word is no depth");
+        let refused = start_values(&given, "/n", Parameters::new(SAMPLE), qos)
+            .expect_err("a word is no depth");
         assert!(
             refused.to_string().contains("an integer from 1"),
             "{refused}"

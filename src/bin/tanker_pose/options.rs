@@ -182,7 +182,7 @@ fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
 mod tests {
     use super::*;
     use clap::Parser;
-    use tanker_pose::config::{Configuration, Parameters};
+    use tanker_pose::config::{Configuration, Parameters, TABLE};
 
     #[derive(Parser)]
     struct Line {
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn options_default_to_what_the_node_does() {
         let line = Line::parse_from(["tool"]);
-        let node = Configuration::from(&Parameters::default()).settings;
+        let node = Configuration::from(&Parameters::new(TABLE)).settings;
         assert_eq!(line.estimator.settings(), node.estimator);
         let sigma_px = line.estimator.pixel_sigma_px;
         assert!((sigma_px - node.pixel_sigma_px).abs() < f64::EPSILON);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::wire::{descriptor, parameter_message, plain_value, type_of, value_message};
-use crate::config::{ConsumerConfiguration, ParameterSpec, ParameterValue, Parameters};
+use crate::config::{ParameterValue, Parameters};
 use crate::ros::messages::{
     ListRequest, ListResult, ParameterDescriptor, SetParametersResult, WireParameter, WireValue,
 };
@@ -12,18 +12,29 @@ use crate::ros::qos_overrides::{QosOverrides, QosParameter};
 use crate::text::{echoed, quoted};
 
 /// The parameters of a running node, shared with its parameter services.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct SharedParameters {
     parameters: Arc<Mutex<Parameters>>,
     // Fixed: the topics are open with them.
     qos: Arc<BTreeMap<String, QosParameter>>,
+    check: Arc<Check>,
     changed: smol::channel::Sender<()>,
 }
 
+/// Says why values that are allowed one by one do not go together.
+type Check = dyn Fn(&Parameters) -> Result<(), String> + Send + Sync;
+
 impl SharedParameters {
     /// Returns shared parameters, and a channel that receives something after a change.
+    ///
+    /// `check` says why values do not go together, though each of them is allowed by itself: no change to such values
+    /// is made.
     #[must_use]
-    pub fn new(parameters: Parameters, qos: &QosOverrides) -> (Self, smol::channel::Receiver<()>) {
+    pub fn new(
+        parameters: Parameters,
+        qos: &QosOverrides,
+        check: impl Fn(&Parameters) -> Result<(), String> + Send + Sync + 'static,
+    ) -> (Self, smol::channel::Receiver<()>) {
         // One place is enough: who reads the channel then reads all the parameters.
         let (changed, changes) = smol::channel::bounded(1);
         let qos = qos
@@ -32,6 +43,7 @@ impl SharedParameters {
         let shared = Self {
             parameters: Arc::new(Mutex::new(parameters)),
             qos: Arc::new(qos.collect()),
+            check: Arc::new(check),
             changed,
         };
         (shared, changes)
@@ -93,7 +105,7 @@ impl SharedParameters {
             if let Some(qos) = self.qos.get(name) {
                 return descriptor(name, &qos.value, &qos.kind, qos.description, true);
             }
-            match (ParameterSpec::find(name), parameters.get(name)) {
+            match (parameters.spec(name), parameters.get(name)) {
                 (Some(spec), Some(value)) => {
                     descriptor(name, value, &spec.kind, spec.description, spec.read_only)
                 }
@@ -124,10 +136,7 @@ impl SharedParameters {
         for WireParameter { name, value } in assignments {
             self.set_one(&mut changed, name, value).map_err(refuse)?;
         }
-        // Each value may be allowed and yet take from an output what it needs.
-        ConsumerConfiguration::from(&changed)
-            .check()
-            .map_err(|error| refuse(error.to_string()))?;
+        (self.check)(&changed).map_err(refuse)?;
         for (name, value) in changed.iter() {
             if parameters.get(name) != Some(value) {
                 log::info!("parameter {name} set to {value}");
@@ -137,7 +146,7 @@ impl SharedParameters {
             .iter()
             .filter_map(|assignment| {
                 // Loaded with a file that holds all values: it stays as it is, and nothing has happened to it.
-                let is_fixed = ParameterSpec::find(&assignment.name)?.read_only;
+                let is_fixed = changed.spec(&assignment.name)?.read_only;
                 let value = changed.get(&assignment.name).filter(|_| !is_fixed)?;
                 Some(parameter_message(&assignment.name, value))
             })
@@ -207,7 +216,8 @@ fn is_listed(name: &str, request: &ListRequest) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Kind, TABLE};
+    use crate::config::Kind;
+    use crate::config::sample::SAMPLE;
     use crate::ros::participant::reliable;
     use crate::ros::qos_overrides::{Endpoint, Role};
 
@@ -215,7 +225,13 @@ mod tests {
 
     fn shared() -> (SharedParameters, smol::channel::Receiver<()>) {
         let pose = Endpoint::new("/pose".into(), Role::Publisher, &reliable(50));
-        SharedParameters::new(Parameters::default(), &QosOverrides::new(vec![pose]))
+        let parameters = Parameters::new(SAMPLE);
+        SharedParameters::new(parameters, &QosOverrides::new(vec![pose]), |changed| {
+            if changed.bool("filtered") && changed.text("mode") == "careful" {
+                return Err("filtered and careful exclude each other".to_owned());
+            }
+            Ok(())
+        })
     }
 
     fn names(names: &[&str]) -> Vec<String> {
@@ -229,12 +245,12 @@ mod tests {
     #[test]
     fn change_is_checked_kept_and_told() {
         let (shared, changes) = shared();
-        let map = parameter_message("marker_map", &ParameterValue::String("fin6".into()));
+        let device = parameter_message("device", &ParameterValue::String("/dev/ttyS1".into()));
         let unset = WireParameter {
-            name: "rectified".into(),
+            name: "filtered".into(),
             ..WireParameter::default()
         };
-        for refused in [integer("max_outliers", 7), map, unset, integer(DEPTH, 1)] {
+        for refused in [integer("retries", 7), device, unset, integer(DEPTH, 1)] {
             let refusal = shared
                 .set(std::slice::from_ref(&refused))
                 .expect_err(&refused.name);
@@ -242,64 +258,49 @@ mod tests {
         }
         assert!(changes.try_recv().is_err(), "nothing has changed yet");
 
-        let same = parameter_message("marker_map", &ParameterValue::String("paper".into()));
-        let change = [integer("max_outliers", 0), integer(DEPTH, 50), same];
+        let same = parameter_message("device", &ParameterValue::String("/dev/ttyS0".into()));
+        let change = [integer("retries", 0), integer(DEPTH, 50), same];
         assert_eq!(
             shared.set(&change).expect("all are allowed"),
             [change[0].clone()]
         );
         assert!(changes.try_recv().is_ok());
         let held = shared.snapshot();
-        assert_eq!(held.get("max_outliers"), Some(&ParameterValue::Integer(0)));
+        assert_eq!(held.get("retries"), Some(&ParameterValue::Integer(0)));
     }
 
     #[test]
     fn one_refusal_refuses_all() {
         let (shared, changes) = shared();
         let refusal = shared
-            .set(&[integer("max_outliers", 0), integer("min_points", 1)])
-            .expect_err("min_points has a bound");
-        assert!(refusal.reason.contains("min_points"), "{}", refusal.reason);
-        assert_eq!(shared.snapshot(), Parameters::default());
+            .set(&[integer("retries", 0), integer("min_samples", 1)])
+            .expect_err("min_samples has a bound");
+        assert!(refusal.reason.contains("min_samples"), "{}", refusal.reason);
+        assert_eq!(shared.snapshot(), Parameters::new(SAMPLE));
         assert!(changes.try_recv().is_err());
     }
 
     #[test]
-    fn the_track_cannot_be_switched_off_under_an_output_that_tells_it() {
-        let mut parameters = Parameters::default();
-        for (name, value) in [
-            ("refuelling", ParameterValue::String("a.yaml".into())),
-            ("publish_receptacle", ParameterValue::Bool(true)),
-        ] {
-            parameters.set(name, value).expect("both are allowed");
-        }
-        let (shared, changes) = SharedParameters::new(parameters, &QosOverrides::new(vec![]));
-        let off = parameter_message("track", &ParameterValue::Bool(false));
+    fn values_that_do_not_go_together_are_refused() {
+        let (shared, changes) = shared();
+        let careful = parameter_message("mode", &ParameterValue::String("careful".into()));
+        let filtered = parameter_message("filtered", &ParameterValue::Bool(true));
         let refusal = shared
-            .set(&[integer("max_outliers", 0), off.clone()])
-            .expect_err("the receptacle comes from the track");
-        assert!(
-            refusal
-                .reason
-                .contains("publish_receptacle comes from the track")
-        );
+            .set(&[integer("retries", 0), careful.clone(), filtered.clone()])
+            .expect_err("they exclude each other");
+        assert_eq!(refusal.reason, "filtered and careful exclude each other");
         assert!(changes.try_recv().is_err());
-        assert_eq!(
-            shared.snapshot().get("track"),
-            Some(&ParameterValue::Bool(true))
-        );
+        assert_eq!(shared.snapshot(), Parameters::new(SAMPLE));
 
-        let (unused, _changes) = self::shared();
-        assert!(unused.set(&[off]).is_ok());
+        assert!(shared.set(&[careful]).is_ok(), "alone it is allowed");
+        assert!(shared.set(&[filtered]).is_err(), "to what was set before");
     }
 
     #[test]
     fn number_is_told_in_the_type_of_its_parameter() {
         let (shared, _changes) = shared();
-        let told = shared
-            .set(&[integer("pixel_sigma_px", 2)])
-            .expect("2 is 2.0");
-        let expected = parameter_message("pixel_sigma_px", &ParameterValue::Double(2.0));
+        let told = shared.set(&[integer("rate_hz", 2)]).expect("2 is 2.0");
+        let expected = parameter_message("rate_hz", &ParameterValue::Double(2.0));
         assert_eq!(told, [expected]);
     }
 
@@ -311,10 +312,14 @@ mod tests {
             shared.list(&ListRequest { prefixes, depth })
         };
         let all = list(&[], 0);
-        assert_eq!(all.names.len(), TABLE.len() + 5);
+        assert_eq!(all.names.len(), SAMPLE.len() + 5);
         assert_eq!(all.prefixes, ["qos_overrides./pose.publisher"]);
-        assert_eq!(list(&[], 1).names.len(), TABLE.len(), "names without a dot");
-        assert_eq!(list(&["min_points"], 1).names, ["min_points"]);
+        assert_eq!(
+            list(&[], 1).names.len(),
+            SAMPLE.len(),
+            "names without a dot"
+        );
+        assert_eq!(list(&["min_samples"], 1).names, ["min_samples"]);
         assert_eq!(list(&["qos_overrides"], 0).names.len(), 5);
         assert!(list(&["qos_overrides"], 2).names.is_empty());
         assert_eq!(list(&["qos_overrides"], 3).names.len(), 5);
@@ -331,7 +336,7 @@ mod tests {
             assert_eq!(*name, descriptor.name);
             assert_ne!(descriptor.kind, 0, "{name}");
             assert!(!descriptor.description.is_empty(), "{name}");
-            let Some(spec) = ParameterSpec::find(name) else {
+            let Some(spec) = shared.snapshot().spec(name) else {
                 assert!(descriptor.read_only, "{name}");
                 continue;
             };
@@ -358,7 +363,7 @@ mod tests {
     #[test]
     fn unknown_names_are_answered_in_their_place() {
         let (shared, _changes) = shared();
-        let asked = names(&["no_such", "min_points", DEPTH]);
+        let asked = names(&["no_such", "min_samples", DEPTH]);
         assert_eq!(shared.types(&asked), [0, 2, 2]);
         let values = shared.get(&asked);
         assert_eq!((values[0].kind, values[1].integer_value), (0, 5));

@@ -13,7 +13,7 @@ mod summary;
 use std::time::Duration;
 
 use async_signal::{Signal, Signals};
-use tanker_pose::config::{Configuration, Parameters};
+use tanker_pose::config::{Configuration, Parameters, TABLE};
 use tanker_pose::pipeline::OutcomeCode;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments as RosArguments};
 use tanker_pose::ros::environment::EnvironmentError;
@@ -149,7 +149,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
 
 /// The node runs with its defaults.
 fn check_marker_count(map: &MarkerMap) -> Result<(), DemoError> {
-    let need = Configuration::from(&Parameters::default())
+    let need = Configuration::from(&Parameters::new(TABLE))
         .settings
         .estimator
         .min_points;

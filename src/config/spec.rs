@@ -1,0 +1,97 @@
+//! What a parameter is: its name, type, default, range and description.
+
+use super::ParameterValue;
+
+/// What a parameter may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// True or false.
+    Bool {
+        /// Value unless set.
+        default: bool,
+    },
+    /// A whole number within bounds.
+    Integer {
+        /// Value unless set.
+        default: i64,
+        /// Least value.
+        min: i64,
+        /// Greatest value.
+        max: i64,
+    },
+    /// A finite number within bounds; a whole number is taken as one.
+    Double {
+        /// Value unless set.
+        default: f64,
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// One of a few words.
+    Choice {
+        /// Value unless set.
+        default: &'static str,
+        /// All of the words.
+        allowed: &'static [&'static str],
+    },
+    /// Text that is not empty.
+    Text {
+        /// Value unless set.
+        default: &'static str,
+    },
+    /// The name of a tf2 frame.
+    FrameId {
+        /// Value unless set.
+        default: &'static str,
+    },
+}
+
+/// What a frame id has to be.
+pub(super) const FRAME_ID: &str =
+    "be a tf2 frame: not empty, without white space, not beginning with a slash, at most 255 bytes";
+/// What any other text has to be.
+pub(super) const TEXT: &str = "not be empty";
+
+impl Kind {
+    /// Returns what is allowed, for people.
+    #[must_use]
+    pub fn allowed(&self) -> String {
+        match self {
+            Self::Bool { .. } => "a bool".to_owned(),
+            Self::Integer { min, max, .. } => format!("an integer from {min} to {max}"),
+            Self::Double { min, max, .. } => format!("a number from {min:?} to {max:?}"),
+            Self::Choice { allowed, .. } => format!("one of {}", allowed.join(", ")),
+            Self::Text { .. } => format!("text that must {TEXT}"),
+            Self::FrameId { .. } => format!("text that must {FRAME_ID}"),
+        }
+    }
+}
+
+/// One parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterSpec {
+    /// Its name.
+    pub name: &'static str,
+    /// What it may be.
+    pub kind: Kind,
+    /// Whether it is fixed once the node runs.
+    pub read_only: bool,
+    /// What it does, with its unit, for people.
+    pub description: &'static str,
+}
+
+impl ParameterSpec {
+    /// Returns the value that holds unless another is set.
+    #[must_use]
+    pub fn default(&self) -> ParameterValue {
+        match self.kind {
+            Kind::Bool { default } => ParameterValue::Bool(default),
+            Kind::Integer { default, .. } => ParameterValue::Integer(default),
+            Kind::Double { default, .. } => ParameterValue::Double(default),
+            Kind::Choice { default, .. } | Kind::Text { default } | Kind::FrameId { default } => {
+                ParameterValue::String(default.to_owned())
+            }
+        }
+    }
+}

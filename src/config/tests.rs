@@ -1,0 +1,57 @@
+//! The table against itself, and values against each other.
+
+use super::*;
+
+#[test]
+fn every_default_is_allowed_by_its_own_range() {
+    let mut parameters = Parameters::new(TABLE);
+    for spec in TABLE {
+        let name = spec.name;
+        assert_eq!(parameters.set(name, spec.default()), Ok(()), "{name}");
+    }
+    assert_eq!(parameters, Parameters::new(TABLE));
+}
+
+#[test]
+fn bounds_of_some_parameters_are_as_documented() {
+    let mut parameters = Parameters::new(TABLE);
+    for (name, value) in [
+        ("max_outliers", ParameterValue::Integer(2)),
+        ("min_points", ParameterValue::Integer(3)),
+        ("max_ambiguity", ParameterValue::Integer(0)),
+        ("trust_probability", ParameterValue::Double(0.5)),
+        ("nominal_yaw_deg", ParameterValue::Double(-180.0)),
+    ] {
+        assert_eq!(parameters.set(name, value), Ok(()), "{name}");
+    }
+    for (name, value) in [
+        ("max_outliers", ParameterValue::Integer(3)),
+        ("min_points", ParameterValue::Integer(2)),
+        ("max_ambiguity", ParameterValue::Double(1.01)),
+        ("trust_probability", ParameterValue::Integer(1)),
+        ("pixel_sigma_px", ParameterValue::Double(0.0)),
+        ("nominal_yaw_deg", ParameterValue::Double(180.1)),
+    ] {
+        let refused = parameters.set(name, value);
+        assert!(
+            matches!(refused, Err(ParameterError::OutOfRange { .. })),
+            "{name}: {refused:?}"
+        );
+    }
+}
+
+#[test]
+fn the_track_cannot_be_switched_off_under_an_output_that_needs_it() {
+    let mut parameters = Parameters::new(TABLE);
+    let mut set = |name, value| {
+        parameters.set(name, value).expect("allowed by itself");
+        check_together(&parameters)
+    };
+    assert_eq!(set("track", ParameterValue::Bool(false)), Ok(()));
+    let file = ParameterValue::String("a.yaml".into());
+    assert_eq!(set("refuelling", file), Ok(()));
+    let refused = set("publish_receptacle", ParameterValue::Bool(true)).expect_err("no track");
+    let words = "publish_receptacle comes from the track";
+    assert!(refused.to_string().contains(words), "{refused}");
+    assert_eq!(set("track", ParameterValue::Bool(true)), Ok(()));
+}
