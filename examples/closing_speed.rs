@@ -19,7 +19,7 @@ use futures::{StreamExt, select};
 use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::consumers::RECEPTACLE;
 use tanker_pose::ros::environment::Environment;
-use tanker_pose::ros::messages::ReceptacleState;
+use tanker_pose::ros::messages::{EstimatorStatus, ReceptacleState};
 use tanker_pose::ros::names::NamesError;
 use tanker_pose::ros::participant::{NodeOptions, RosNode, Subscription, reliable};
 
@@ -47,7 +47,7 @@ fn missing(node: &RosNode, domain_id: u16) -> Result<String, NamesError> {
     let why = if node.publisher_count(RECEPTACLE)? > 0 {
         "it has a publisher, so the node has no confirmed track: `tanker_pose watch` says why"
             .to_owned()
-    } else if node.domain().nodes.is_empty() {
+    } else if node.domain::<EstimatorStatus>().nodes.is_empty() {
         format!("no tanker_pose node is in domain {domain_id}")
     } else {
         "a tanker_pose node is there, but does not publish it. Start the node with \

@@ -3,9 +3,28 @@
 use std::io::Write;
 use std::process::ExitCode;
 
-use tanker_pose::ros::arguments::{Command, HELP};
+use tanker_pose::ros::arguments::{self, Command};
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::node;
+
+/// What `--help` prints before the ROS arguments.
+const ABOUT: &str = "\
+Estimates a tanker's pose from detected beacons, and publishes it with its covariance.
+
+Usage: tanker_pose_node [--ros-args [ROS ARGUMENT]... [--]]
+";
+/// And what it prints after them.
+const DETAILS: &str = "\
+Options:
+  -h, --help                     print this help
+  -V, --version                  print the version
+
+Topics in: camera_info; feature_points, or detections with parameter input; the receiver's attitude, with the outputs
+  for flight stacks that need it. Out: pose, odometry, status, /diagnostics; by parameters /tf, markers, receptacle and
+  those of PX4 and MAVROS. Services: ~/reset, those of parameters, and with lifecycle those of a managed node.
+Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RUST_LOG.
+All parameters stand with their defaults and comments in config/tanker_pose.yaml.
+";
 
 /// Exit code for a command line that cannot be understood.
 const USAGE: u8 = 2;
@@ -33,7 +52,8 @@ fn main() -> ExitCode {
     let arguments = match Command::parse(&arguments) {
         Ok(Command::Run(arguments)) => arguments,
         Ok(Command::Help) => {
-            return say(HELP.trim_end());
+            let help = [ABOUT, arguments::HELP, DETAILS].join("\n");
+            return say(help.trim_end());
         }
         Ok(Command::Version) => {
             return say(concat!("tanker_pose_node ", env!("CARGO_PKG_VERSION")));

@@ -8,12 +8,8 @@ use ros2args::{RemapRule, Ros2Args, Ros2ArgsError};
 use super::rules::{self, Assignment};
 use crate::text::clip;
 
-/// What `--help` prints.
+/// The ROS arguments that [`Arguments::split`] takes, for a program's `--help`.
 pub const HELP: &str = "\
-Estimates a tanker's pose from detected beacons, and publishes it with its covariance.
-
-Usage: tanker_pose_node [--ros-args [ROS ARGUMENT]... [--]]
-
 ROS arguments:
   -p, --param name:=value        set a parameter (node:name:=value: for that node only)
       --params-file FILE         set parameters from a YAML file
@@ -22,16 +18,6 @@ ROS arguments:
       --disable-rosout-logs      do not publish log messages to /rosout
       --disable-stdout-logs      do not print log messages
   -e, --enclave PATH             accepted; this build has no DDS security
-
-Options:
-  -h, --help                     print this help
-  -V, --version                  print the version
-
-Topics in: camera_info; feature_points, or detections with parameter input; the receiver's attitude, with the outputs
-  for flight stacks that need it. Out: pose, odometry, status, /diagnostics; by parameters /tf, markers, receptacle and
-  those of PX4 and MAVROS. Services: ~/reset, those of parameters, and with lifecycle those of a managed node.
-Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RUST_LOG.
-All parameters stand with their defaults and comments in config/tanker_pose.yaml.
 ";
 
 /// ROS arguments, read but not yet applied to a node.
@@ -76,7 +62,7 @@ impl Default for Arguments {
 pub enum Command {
     /// Start.
     Run(Arguments),
-    /// Print [`HELP`] and end.
+    /// Print the help and end.
     Help,
     /// Print the version and end.
     Version,

@@ -6,7 +6,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use futures::{StreamExt, pin_mut};
 use ros2_client::Subscription;
 
-use super::health::{ClockSilence, Jumps};
+use super::jump::Jumps;
 use super::messages::{Clock, Time};
 use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, sensor_data};
@@ -21,6 +21,15 @@ const LATEST: QosProfile = sensor_data(1);
 pub struct NodeClock {
     /// The simulated time while `use_sim_time` is set.
     simulated: Arc<Mutex<Option<Simulated>>>,
+}
+
+/// How long simulated time has not come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClockSilence {
+    /// When the last one came, or since when it is wanted.
+    pub since: Instant,
+    /// Whether one ever came.
+    pub ever: bool,
 }
 
 #[derive(Debug)]
@@ -70,12 +79,14 @@ impl NodeClock {
     }
 
     /// Returns how the simulated time has jumped since this was asked last, if it has.
-    pub(super) fn take_jump(&self) -> Option<String> {
+    #[must_use]
+    pub fn take_jump(&self) -> Option<String> {
         self.lock().as_mut().and_then(|s| s.jump.take())
     }
 
     /// Returns since when simulated time is wanted and none has come; none while time is the system's.
-    pub(super) fn silence(&self) -> Option<ClockSilence> {
+    #[must_use]
+    pub fn silence(&self) -> Option<ClockSilence> {
         self.lock().as_ref().map(|simulated| ClockSilence {
             since: simulated.since,
             ever: simulated.time.is_some(),

@@ -69,7 +69,7 @@ pub enum EnvironmentError {
     /// Discovery switched off altogether.
     #[error(
         "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: without discovery this node could neither hear \
-         detections nor be heard; use LOCALHOST to stay on this host"
+         others nor be heard; use LOCALHOST to stay on this host"
     )]
     DiscoveryOff,
     /// Security demanded, which this build does not have.

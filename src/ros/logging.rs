@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{OnceLock, PoisonError, RwLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use log::{Level, Log, Metadata, Record};
+use log::{Level, LevelFilter, Log, Metadata, Record};
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::ros2::LogLevel;
 use ros2_client::{NodeLoggingHandle, RosoutRaw};
@@ -16,17 +16,12 @@ use super::arguments::Arguments;
 use super::names::NodeNames;
 use crate::text;
 
-/// This package's own lines from info on; other crates' from warnings on, but the middleware's from
-/// errors on: it warns of every packet and every string that is not as it should be, which here is
-/// counted, and said once. Not even its errors about the order of samples: while the system's clock is behind there is
-/// one for every look at an input, and the fault `clock_jump` says it. What the client library says of `ROS_DISTRO` is an error to it even where both
-/// distributions speak alike; `distribution` tells the two apart.
-const DEFAULT_FILTER: &str = "warn,tanker_pose=info,rustdds=error,\
-    rustdds::structure::dds_cache=off,ros2_client=error,\
-    ros2_client::distributions=off,cdr_encoding=error";
-/// The crates of this package, library and programs, by the beginning of their names. Only their
-/// lines go to /rosout: publishing those of the middleware would bring forth more of them.
-const OWN: &str = "tanker_pose";
+/// Other crates' lines from warnings on, but the middleware's from errors on: it warns of every packet and every
+/// string that is not as it should be. Not even its errors about the order of samples: while the system's clock is
+/// behind there is one for every look at an input, and [`super::system_clock`] says it. What the client library says of
+/// `ROS_DISTRO` is an error to it even where both distributions speak alike; [`super::distribution`] tells the two apart.
+const DEFAULT_FILTER: &str = "warn,rustdds=error,rustdds::structure::dds_cache=off,\
+    ros2_client=error,ros2_client::distributions=off,cdr_encoding=error";
 /// Where the client library repeats what it published to /rosout.
 const ECHO: &str = "ros2_client::rosout";
 /// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
@@ -44,31 +39,28 @@ struct NodeLog {
     console: env_logger::Logger,
     console_on: bool,
     name: String,
+    own: &'static str,
     rosout: RwLock<Option<NodeLoggingHandle>>,
     leaving: AtomicBool,
 }
 
 /// Starts logging for the node of this name. What `--log-level` says goes before `RUST_LOG`, and that
 /// before the defaults. A second call has no effect.
-pub fn start(arguments: &Arguments, names: &NodeNames) {
+///
+/// `own` is what the targets of the program's own lines begin with, as the names of its crates do. These lines are
+/// shown from info on, stand under the node's name, and only they go to /rosout: publishing those of the middleware
+/// would bring forth more of them.
+pub fn start(arguments: &Arguments, names: &NodeNames, own: &'static str) {
     let name = logger_name(names);
-    let mut builder = env_logger::Builder::new();
-    builder.parse_filters(DEFAULT_FILTER);
-    if let Ok(filters) = std::env::var("RUST_LOG") {
-        builder.parse_filters(&filters);
-    }
-    for (logger, level) in &arguments.log_levels {
-        match logger {
-            None => builder.filter(Some(OWN), *level),
-            Some(logger) => builder.filter(Some(&module(logger, &name, names)), *level),
-        };
-    }
+    let variable = std::env::var("RUST_LOG").ok();
+    let mut builder = console(arguments, names, own, variable.as_deref());
     let line_name = name.clone();
-    builder.format(move |out, record| write_line(out, record, &line_name));
+    builder.format(move |out, record| write_line(out, record, &line_name, own));
     let logger = NodeLog {
         console: builder.build(),
         console_on: arguments.console_logs,
         name,
+        own,
         rosout: RwLock::new(None),
         leaving: AtomicBool::new(false),
     };
@@ -79,6 +71,31 @@ pub fn start(arguments: &Arguments, names: &NodeNames) {
     {
         log::set_max_level(level);
     }
+}
+
+/// Returns what is shown: the defaults, changed by the variable and by `--log-level`.
+fn console(
+    arguments: &Arguments,
+    names: &NodeNames,
+    own: &str,
+    variable: Option<&str>,
+) -> env_logger::Builder {
+    let name = logger_name(names);
+    let mut builder = env_logger::Builder::new();
+    builder.parse_filters(DEFAULT_FILTER);
+    builder.filter(Some(own), LevelFilter::Info);
+    if let Some(filters) = variable {
+        builder.parse_filters(filters);
+    }
+    for (logger, level) in &arguments.log_levels {
+        match logger {
+            Some(logger) if !is_node(logger, &name, names) => {
+                builder.filter(Some(&logger.replace('.', "::")), *level)
+            }
+            _ => builder.filter(Some(own), *level),
+        };
+    }
+    builder
 }
 
 /// Sends log messages to /rosout too, from now on.
@@ -111,26 +128,23 @@ fn logger_name(names: &NodeNames) -> String {
         .replace('/', ".")
 }
 
-/// The node's own logger is this package; any other is named as its crate is.
-fn module(logger: &str, own: &str, names: &NodeNames) -> String {
-    if logger == own || logger == names.base_name() {
-        OWN.to_owned()
-    } else {
-        logger.replace('.', "::")
-    }
+/// Whether `--log-level` means the node's own logger; any other is named as its crate is.
+fn is_node(logger: &str, logger_name: &str, names: &NodeNames) -> bool {
+    logger == logger_name || logger == names.base_name()
 }
 
 fn write_line(
     out: &mut env_logger::fmt::Formatter,
     record: &Record,
     name: &str,
+    own: &str,
 ) -> std::io::Result<()> {
     let since_epoch = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();
     let (sec, nanosec) = (since_epoch.as_secs(), since_epoch.subsec_nanos());
     let style = out.default_level_style(record.level());
-    let who = if is_own(record.target()) {
+    let who = if is_own(record.target(), own) {
         name
     } else {
         record.target()
@@ -143,8 +157,8 @@ fn write_line(
     )
 }
 
-fn is_own(target: &str) -> bool {
-    target.starts_with(OWN)
+fn is_own(target: &str, own: &str) -> bool {
+    target.starts_with(own)
 }
 
 impl Log for NodeLog {
@@ -167,7 +181,7 @@ impl Log for NodeLog {
         if self.console_on {
             self.console.log(record);
         }
-        if !is_own(record.target()) {
+        if !is_own(record.target(), self.own) {
             return;
         }
         let rosout = self.rosout.read().unwrap_or_else(PoisonError::into_inner);
@@ -200,34 +214,49 @@ const fn ros_level(level: Level) -> LogLevel {
 
 #[cfg(test)]
 mod tests {
-    use log::LevelFilter;
-
     use super::*;
+
+    fn names() -> NodeNames {
+        let remap = crate::ros::rules::remap("__ns:=/left").expect("the rule is well formed");
+        NodeNames::new("sensor", &[remap]).expect("the names are valid")
+    }
 
     #[test]
     fn loggers_are_named_as_in_ros() {
-        let names = NodeNames::new("tanker_pose", &[]).expect("the default name is valid");
-        assert_eq!(logger_name(&names), "tanker_pose");
-        assert_eq!(module("tanker_pose", "tanker_pose", &names), "tanker_pose");
-        assert_eq!(
-            module("rustdds.rtps", "tanker_pose", &names),
-            "rustdds::rtps"
-        );
+        let names = names();
+        let own = logger_name(&names);
+        assert_eq!(own, "left.sensor");
+        assert!(is_node("left.sensor", &own, &names) && is_node("sensor", &own, &names));
+        assert!(!is_node("rustdds", &own, &names));
     }
 
     #[test]
     fn default_filter_keeps_own_lines_and_quietens_the_middleware() {
-        let mut builder = env_logger::Builder::new();
-        builder.parse_filters(DEFAULT_FILTER);
-        builder.filter(Some(OWN), LevelFilter::Debug); // as --log-level debug does
-        let logger = builder.build();
+        let (arguments, _) =
+            Arguments::split(&["--ros-args", "--log-level", "debug"].map(Into::into))
+                .expect("the arguments are well formed");
+        let logger = console(&arguments, &names(), "sensor_driver", None).build();
         let enabled = |target: &str, level| {
             logger.enabled(&Metadata::builder().target(target).level(level).build())
         };
-        assert!(enabled("tanker_pose::ros::node", Level::Debug));
-        assert!(enabled("tanker_pose_node", Level::Debug));
+        assert!(enabled("sensor_driver::device", Level::Debug));
+        assert!(enabled("sensor_driver_node", Level::Debug));
         assert!(!enabled("rustdds::rtps", Level::Warn));
         assert!(!enabled("polling", Level::Info));
         assert!(enabled("rustdds::rtps", Level::Error));
+    }
+
+    #[test]
+    fn arguments_go_before_the_variable_and_that_before_the_defaults() {
+        let arguments = ["--ros-args", "--log-level", "rustdds.rtps:=warn"].map(Into::into);
+        let (arguments, _) = Arguments::split(&arguments).expect("they are well formed");
+        let variable = Some("rustdds=off,sensor_driver=error");
+        let logger = console(&arguments, &names(), "sensor_driver", variable).build();
+        let enabled = |target: &str, level| {
+            logger.enabled(&Metadata::builder().target(target).level(level).build())
+        };
+        assert!(!enabled("sensor_driver", Level::Warn));
+        assert!(!enabled("rustdds::discovery", Level::Error));
+        assert!(enabled("rustdds::rtps", Level::Warn));
     }
 }

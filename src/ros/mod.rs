@@ -7,7 +7,7 @@
 //! scalar, parameter_file             what words mean; the sections of a parameter file
 //! overrides, start_values            which value counts for this node; all its parameters at the start
 //! parameters, qos_overrides          parameters while the node runs, behind its services
-//! clock                              the node's time, the system's or a simulation's
+//! clock, jump, system_clock          the node's time, the system's or a simulation's, and where it does not go on
 //! participant, leave                 into the graph, and out of it
 //! lifecycle                          a managed node's states, behind their services
 //! service, reset, rtps               services, and what of the wire protocol is written here
@@ -36,6 +36,7 @@ pub mod estimator;
 pub mod graph;
 pub mod health;
 pub mod input;
+pub mod jump;
 pub mod leave;
 pub mod lifecycle;
 pub mod logging;
@@ -58,6 +59,10 @@ mod scalar;
 mod serve;
 pub mod service;
 pub mod start_values;
+pub mod system_clock;
 #[cfg(test)]
 mod tests;
 mod understood;
+
+/// What the targets of this package's log lines begin with: those of its library and of its programs.
+pub const LOG_TARGET: &str = "tanker_pose";

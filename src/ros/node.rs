@@ -8,6 +8,7 @@ use async_signal::{Signal, Signals};
 use futures::StreamExt;
 use ros2_client::NodeOptions;
 
+use super::LOG_TARGET;
 use super::arguments::Arguments;
 use super::attitude::{self, AttitudeSubscription};
 use super::clock::NodeClock;
@@ -113,7 +114,7 @@ pub enum NodeError {
 /// [`NodeError`] when it cannot start; once it runs, nothing stops it but a signal and the end of the middleware.
 pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeError> {
     let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
-    logging::start(arguments, &names);
+    logging::start(arguments, &names, LOG_TARGET);
     // From here on a signal is kept until the node reads it, and ends it in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(NodeError::Signals)?;
     run_until(arguments, environment, async move {

@@ -1,14 +1,14 @@
 //! A node in the ROS graph: opened from arguments and environment, closed so that others notice.
 //!
 //! ```no_run
-//! use tanker_pose::ros::{arguments::Arguments, environment::Environment, messages::PoseStamped};
+//! use tanker_pose::ros::{arguments::Arguments, environment::Environment, messages::Header};
 //! use tanker_pose::ros::participant::{NodeOptions, RosNode, reliable};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let environment = Environment::from_process()?;
 //! let mut node = RosNode::open("example", &Arguments::default(), &environment, NodeOptions::new())?;
-//! let publisher = node.publisher::<PoseStamped>("pose", &reliable(10))?;
-//! publisher.publish(PoseStamped::default())?;
+//! let publisher = node.publisher::<Header>("header", &reliable(10))?;
+//! publisher.publish(Header::default())?;
 //! drop(publisher); // endpoints go before their node
 //! node.close();
 //! # Ok(())
@@ -263,10 +263,10 @@ impl RosNode {
         Graph::of(&self.context.domain_participant(), &self.own_ends)
     }
 
-    /// Returns what the domain holds beside this node.
+    /// Returns what the domain holds beside this node, and the nodes in it that publish `M`.
     #[must_use]
-    pub fn domain(&self) -> Domain {
-        Domain::of(&self.context.domain_participant())
+    pub fn domain<M: Message>(&self) -> Domain {
+        Domain::of::<M>(&self.context.domain_participant())
     }
 
     /// Returns whether the middleware's threads still run. They end, for good, when the process is stopped and
@@ -337,7 +337,7 @@ impl RosNode {
 #[cfg(test)]
 mod tests {
     use super::super::environment::DiscoveryRange;
-    use super::super::messages::{Header, PoseStamped, Time};
+    use super::super::messages::{Header, Time};
     use super::*;
 
     /// Discovery on one host takes a fraction of a second; a loaded machine may take several.
@@ -362,20 +362,17 @@ mod tests {
     fn message_passes_between_two_nodes_of_this_host_bit_for_bit() {
         let (mut sender, mut receiver) = (open("sender"), open("receiver"));
         let subscription = receiver
-            .subscription::<PoseStamped>("~/pose", &sensor_data(10))
+            .subscription::<Header>("~/header", &sensor_data(10))
             .expect("the name is valid");
         let publisher = sender
-            .publisher::<PoseStamped>("/receiver/pose", &reliable(10))
+            .publisher::<Header>("/receiver/header", &reliable(10))
             .expect("the name is valid");
-        let sent = PoseStamped {
-            header: Header {
-                stamp: Time {
-                    sec: -1,
-                    nanosec: 999_999_999,
-                },
-                frame_id: "camera".to_owned(),
+        let sent = Header {
+            stamp: Time {
+                sec: -1,
+                nanosec: 999_999_999,
             },
-            ..PoseStamped::default()
+            frame_id: "sensor".to_owned(),
         };
 
         let received = smol::block_on(async {

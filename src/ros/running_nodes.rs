@@ -1,14 +1,14 @@
-//! The nodes of a domain that publish what this package's node publishes, under whatever names.
+//! The nodes of a domain that publish messages of one type, under whatever names.
 //!
-//! A remapped topic cannot be found by its name. Its type can: a participant that publishes `EstimatorStatus` is
-//! one to listen to, and its other topics are recognised by their types.
+//! A remapped topic cannot be found by its name. Its type can: a participant that publishes a type which only one kind
+//! of node has is such a node, and its other topics are recognised by their types.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use ros2_client::dds::rustdds::DomainParticipant;
 
 use super::graph::type_on_the_wire;
-use super::messages::{EstimatorStatus, Message};
+use super::messages::Message;
 
 /// Every ROS node that has parameters answers this service, whose name begins with the node's.
 const NAMING_SERVICE: &str = "/get_parametersRequest";
@@ -16,22 +16,22 @@ const NAMING_SERVICE: &str = "/get_parametersRequest";
 /// Identifies a participant, which is one process: the beginning of the identifiers of its publishers.
 pub type ParticipantId = [u8; 12];
 
-/// A process that publishes `EstimatorStatus`.
+/// A process that publishes the type that was looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunningNode {
     /// The process.
     pub participant: ParticipantId,
     /// Absolute name of the node; none until its services are known, or when several nodes share the process.
     pub name: Option<String>,
-    /// Absolute name of the topic of the status.
-    pub status: String,
+    /// Absolute name of the topic of that type.
+    pub known_by: String,
     /// What it publishes: absolute name, and type on the wire.
     pub topics: BTreeSet<(String, String)>,
 }
 
 impl RunningNode {
     /// Returns the topic on which the node publishes `M`: `wanted` if it is among them, else the only one that
-    /// carries this type, or the one beside the status with the same last part of its name as `wanted`.
+    /// carries this type, or the one beside [`Self::known_by`] with the same last part of its name as `wanted`.
     #[must_use]
     pub fn topic<M: Message>(&self, wanted: &str) -> Option<&str> {
         let of_type = type_on_the_wire::<M>();
@@ -42,7 +42,7 @@ impl RunningNode {
             .map(|(topic, _)| topic.as_str())
             .collect();
         let beside = |topic: &str| {
-            let (namespace, _) = self.status.rsplit_once('/').unwrap_or_default();
+            let (namespace, _) = self.known_by.rsplit_once('/').unwrap_or_default();
             let (_, last) = wanted.rsplit_once('/').unwrap_or(("", wanted));
             topic
                 .strip_prefix(namespace)
@@ -63,7 +63,7 @@ impl RunningNode {
 /// What a domain holds beside the node that looks around in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Domain {
-    /// Those that publish `EstimatorStatus`, one for each topic of it.
+    /// Those that publish the type that was looked for, one for each topic of it.
     pub nodes: Vec<RunningNode>,
     /// How many processes publish anything.
     pub processes: usize,
@@ -77,9 +77,9 @@ struct Process {
 }
 
 impl Domain {
-    /// Returns what the participant has discovered.
+    /// Returns what the participant has discovered, and the nodes that publish `M`.
     #[must_use]
-    pub fn of(participant: &DomainParticipant) -> Self {
+    pub fn of<M: Message>(participant: &DomainParticipant) -> Self {
         let mut processes: BTreeMap<ParticipantId, Process> = BTreeMap::new();
         for writer in participant.discovered_writers() {
             let data = writer.publication_topic_data;
@@ -101,11 +101,10 @@ impl Domain {
                 process.names.insert(node.to_owned());
             }
         }
-        Self::from_processes(processes)
+        Self::from_processes(processes, &type_on_the_wire::<M>())
     }
 
-    fn from_processes(processes: BTreeMap<ParticipantId, Process>) -> Self {
-        let status_type = type_on_the_wire::<EstimatorStatus>();
+    fn from_processes(processes: BTreeMap<ParticipantId, Process>, wanted: &str) -> Self {
         let mut domain = Self {
             nodes: Vec::new(),
             processes: processes.len(),
@@ -116,11 +115,11 @@ impl Domain {
                 (Some(only), None) => Some(only.clone()),
                 _ => None,
             };
-            let carriers = process.topics.iter().filter(|(_, t)| *t == status_type);
-            domain.nodes.extend(carriers.map(|(status, _)| RunningNode {
+            let carriers = process.topics.iter().filter(|(_, t)| t == wanted);
+            domain.nodes.extend(carriers.map(|(topic, _)| RunningNode {
                 participant,
                 name: name.clone(),
-                status: status.clone(),
+                known_by: topic.clone(),
                 topics: process.topics.clone(),
             }));
         }
@@ -137,7 +136,11 @@ pub fn id(of_endpoint: &[u8]) -> ParticipantId {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::messages::{DiagnosticArray, Odometry, PoseWithCovarianceStamped};
+    use crate::ros::messages::{Clock, Header, ParameterEvent, TransitionEvent};
+
+    fn event() -> String {
+        type_on_the_wire::<TransitionEvent>()
+    }
 
     fn publishing(topics: &[(&str, String)], names: &[&str]) -> Process {
         Process {
@@ -151,12 +154,12 @@ mod tests {
 
     fn domain(processes: Vec<Process>) -> Domain {
         let numbered = (0_u8..).map(|n| [n; 12]);
-        Domain::from_processes(numbered.zip(processes).collect())
+        Domain::from_processes(numbered.zip(processes).collect(), &event())
     }
 
     #[test]
     fn node_is_found_by_its_types_under_whatever_names() {
-        let pose = type_on_the_wire::<PoseWithCovarianceStamped>();
+        let clock = type_on_the_wire::<Clock>();
         let found = domain(vec![
             publishing(
                 &[("/chatter", "std_msgs::msg::dds_::String_".into())],
@@ -164,67 +167,57 @@ mod tests {
             ),
             publishing(
                 &[
-                    ("/a/judgement", type_on_the_wire::<EstimatorStatus>()),
-                    ("/b/tanker", pose),
-                    ("/health", type_on_the_wire::<DiagnosticArray>()),
+                    ("/a/changes", event()),
+                    ("/b/time", clock),
+                    ("/settings", type_on_the_wire::<ParameterEvent>()),
                 ],
-                &["/a/estimator"],
+                &["/a/player"],
             ),
         ]);
         assert_eq!(found.processes, 2);
         assert_eq!(found.nodes.len(), 1);
         let node = &found.nodes[0];
-        assert_eq!(node.name.as_deref(), Some("/a/estimator"));
+        assert_eq!(node.name.as_deref(), Some("/a/player"));
         assert_eq!(node.participant, [1; 12]);
-        assert_eq!(node.status, "/a/judgement");
+        assert_eq!(node.known_by, "/a/changes");
+        assert_eq!(node.topic::<Clock>("/clock"), Some("/b/time"));
         assert_eq!(
-            node.topic::<PoseWithCovarianceStamped>("/pose"),
-            Some("/b/tanker")
+            node.topic::<ParameterEvent>("/parameter_events"),
+            Some("/settings")
         );
-        assert_eq!(
-            node.topic::<DiagnosticArray>("/diagnostics"),
-            Some("/health")
-        );
-        assert_eq!(node.topic::<Odometry>("/odometry"), None);
+        assert_eq!(node.topic::<Header>("/header"), None);
     }
 
     #[test]
-    fn of_several_topics_with_one_type_the_one_beside_the_status_is_taken_unless_another_is_wanted()
-    {
-        let pose = type_on_the_wire::<PoseWithCovarianceStamped>();
+    fn of_several_topics_with_one_type_the_one_beside_is_taken_unless_another_is_wanted() {
+        let clock = type_on_the_wire::<Clock>();
         let found = domain(vec![publishing(
             &[
-                ("/uav1/status", type_on_the_wire::<EstimatorStatus>()),
-                ("/mavros/landing_target/pose", pose.clone()),
-                ("/uav1/pose", pose),
+                ("/left/changes", event()),
+                ("/right/inner/clock", clock.clone()),
+                ("/left/clock", clock),
             ],
             &[],
         )]);
         let node = &found.nodes[0];
         assert_eq!(node.name, None);
-        assert_eq!(
-            node.topic::<PoseWithCovarianceStamped>("/pose"),
-            Some("/uav1/pose")
-        );
-        let wanted = "/mavros/landing_target/pose";
-        assert_eq!(
-            node.topic::<PoseWithCovarianceStamped>(wanted),
-            Some(wanted)
-        );
+        assert_eq!(node.topic::<Clock>("/clock"), Some("/left/clock"));
+        let wanted = "/right/inner/clock";
+        assert_eq!(node.topic::<Clock>(wanted), Some(wanted));
     }
 
     #[test]
-    fn process_of_several_nodes_has_no_name_and_every_status_counts() {
-        let status = type_on_the_wire::<EstimatorStatus>();
+    fn process_of_several_nodes_has_no_name_and_every_topic_counts() {
+        let changes = event();
         let found = domain(vec![publishing(
-            &[("/a/status", status.clone()), ("/b/status", status)],
+            &[("/a/changes", changes.clone()), ("/b/changes", changes)],
             &["/player", "/recorder"],
         )]);
         let named: Vec<_> = found
             .nodes
             .iter()
-            .map(|node| (&node.name, node.status.as_str()))
+            .map(|node| (&node.name, node.known_by.as_str()))
             .collect();
-        assert_eq!(named, [(&None, "/a/status"), (&None, "/b/status")]);
+        assert_eq!(named, [(&None, "/a/changes"), (&None, "/b/changes")]);
     }
 }

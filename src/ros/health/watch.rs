@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use nalgebra::UnitQuaternion;
 
 use super::{
-    Attitude, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge, Suspects,
-    Unexpected,
+    Attitude, ClockSilence, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge,
+    Suspects, Unexpected,
 };
 use crate::pipeline::{DetectionFrame, FrameOutcome, OutcomeCode, Pipeline};
 use crate::refuelling::ExpectedAttitude;
@@ -79,15 +79,6 @@ impl Arrivals {
 
 fn is_long(since: Instant, now: Instant) -> bool {
     now.saturating_duration_since(since) >= SILENCE
-}
-
-/// How long simulated time has not come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClockSilence {
-    /// When the last one came, or since when it is wanted.
-    pub since: Instant,
-    /// Whether one ever came.
-    pub ever: bool,
 }
 
 /// What a second brings beside the messages.

@@ -73,6 +73,7 @@ ros_message!(
     "lifecycle_msgs" / TransitionEvent,
     "rcl_interfaces" / ParameterEvent,
     "rosgraph_msgs" / Clock,
+    "std_msgs" / Header,
     "visualization_msgs" / MarkerArray,
     "vision_msgs" / Detection2DArray,
     "apriltag_msgs" / AprilTagDetectionArray,

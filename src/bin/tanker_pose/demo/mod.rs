@@ -17,10 +17,10 @@ use tanker_pose::config::{Configuration, Parameters, TABLE};
 use tanker_pose::pipeline::OutcomeCode;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments as RosArguments};
 use tanker_pose::ros::environment::EnvironmentError;
-use tanker_pose::ros::logging;
 use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::{NODE_NAME, NodeError};
 use tanker_pose::ros::participant::{EndpointError, OpenError};
+use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::target::MarkerMap;
 
 use crate::options::between;
@@ -118,7 +118,8 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     // From here on a signal is kept until it is read, and ends both nodes in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(DemoError::Signals)?;
     if arguments.verbose {
-        logging::start(&ros_arguments, &NodeNames::new(NODE_NAME, &[])?);
+        let names = NodeNames::new(NODE_NAME, &[])?;
+        logging::start(&ros_arguments, &names, LOG_TARGET);
     }
     let mut live = Live::new(
         arguments.json,

@@ -13,10 +13,10 @@ use futures::StreamExt;
 use futures::future::{Either, select};
 use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::environment::{Environment, EnvironmentError};
-use tanker_pose::ros::logging;
 use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
+use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::simulation::Approach;
 
 use crate::options::between;
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
     // From here on a signal is kept until it is read, and ends the node in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(SimulateError::Signals)?;
     let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, NodeOptions::new())?;
-    logging::start(&ros_arguments, ros.names());
+    logging::start(&ros_arguments, ros.names(), LOG_TARGET);
     for warning in environment.warnings.iter().chain(&warnings) {
         log::warn!("{warning}");
     }

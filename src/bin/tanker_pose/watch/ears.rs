@@ -94,7 +94,7 @@ impl Ears {
     pub fn attend(&mut self, ros: &mut RosNode, node: &RunningNode) -> Result<(), EndpointError> {
         let topic = node.topic::<PoseWithCovarianceStamped>(&self.pose.wanted);
         self.pose.attend(ros, topic)?;
-        self.status.attend(ros, Some(&node.status))?;
+        self.status.attend(ros, Some(&node.known_by))?;
         let topic = node.topic::<Odometry>(&self.odometry.wanted);
         self.odometry.attend(ros, topic)?;
         let topic = node.topic::<DiagnosticArray>(&self.diagnostics.wanted);

@@ -16,10 +16,11 @@ use futures::StreamExt;
 use futures::future::{Either, select};
 use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::environment::{Environment, EnvironmentError};
-use tanker_pose::ros::logging;
+use tanker_pose::ros::messages::EstimatorStatus;
 use tanker_pose::ros::names::{NamesError, NodeNames};
 use tanker_pose::ros::node::STATUS;
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode};
+use tanker_pose::ros::{LOG_TARGET, logging};
 
 use crate::options::between;
 use crate::ros_options::{NoParametersError, RosOptions, check_no_parameters};
@@ -103,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<(), WatchError> {
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(WatchError::Signals)?;
     let options = NodeOptions::new().start_parameter_services(false);
     let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, options)?;
-    logging::start(&ros_arguments, ros.names());
+    logging::start(&ros_arguments, ros.names(), LOG_TARGET);
     for warning in environment.warnings.iter().chain(&warnings) {
         log::warn!("{warning}");
     }
@@ -199,7 +200,7 @@ impl Watch {
         if !ros.is_alive() {
             return Err(WatchError::MiddlewareGone);
         }
-        self.search.look(&ros.domain(), now)?;
+        self.search.look(&ros.domain::<EstimatorStatus>(), now)?;
         if let Some(found) = self.search.found() {
             self.ears.attend(ros, &found.node)?;
             let name = found.name();

@@ -175,7 +175,7 @@ impl Search {
             && self
                 .status
                 .as_deref()
-                .is_none_or(|wanted| node.status == wanted)
+                .is_none_or(|wanted| node.known_by == wanted)
     }
 }
 
@@ -196,11 +196,11 @@ impl Found {
 }
 
 fn identity(node: &RunningNode) -> Identity {
-    (node.name.clone(), node.status.clone())
+    (node.name.clone(), node.known_by.clone())
 }
 
 fn name(node: &RunningNode) -> String {
-    words(node.name.as_deref(), &node.status)
+    words(node.name.as_deref(), &node.known_by)
 }
 
 fn words(name: Option<&str>, status: &str) -> String {
@@ -215,7 +215,7 @@ mod tests {
         RunningNode {
             participant: [process; 12],
             name: Some(name.to_owned()),
-            status: status.to_owned(),
+            known_by: status.to_owned(),
             topics: BTreeSet::new(),
         }
     }
@@ -272,7 +272,7 @@ mod tests {
         one.look(&both, now).expect("one was asked for");
         one.look(&both, now + SETTLE).expect("one was asked for");
         assert_eq!(
-            one.found().map(|found| found.node.status.as_str()),
+            one.found().map(|found| found.node.known_by.as_str()),
             Some("/b/status")
         );
     }
