@@ -191,6 +191,7 @@ mod tests {
             chi_squared_limit: 26.1,
             initialisation: Initialisation::Nominal,
             excluded: Excluded::default(),
+            unclear: Excluded::default(),
         }
     }
 

@@ -132,20 +132,20 @@ fn report(name: &str, tally: &Tally) -> f64 {
 fn the_wrong_points_are_left_out() {
     let none: Fault = |_, _| Vec::new();
     let cases: [(&str, usize, Fault, f64, f64); 8] = [
-        ("6 points, clean", 6, none, 99.99, 0.0),
-        ("6 points, one gross", 6, gross::<1>, 99.5, 0.3),
-        ("6 points, two gross", 6, gross::<2>, 96.0, 2.0),
-        ("6 points, two ids exchanged", 6, exchanged, 98.0, 0.8),
+        ("6 points, clean", 6, none, 99.8, 0.0),
+        ("6 points, one gross", 6, gross::<1>, 98.9, 0.15),
+        ("6 points, two gross", 6, gross::<2>, 89.2, 0.8),
+        ("6 points, two ids exchanged", 6, exchanged, 99.2, 0.5),
         (
             "6 points, one occluded, one gross",
             6,
             occluded_and_gross,
-            99.0,
-            1.2,
+            94.7,
+            0.6,
         ),
-        ("8 points, two gross", 8, gross::<2>, 99.8, 0.2),
-        ("12 points, two gross", 12, gross::<2>, 99.8, 0.2),
-        ("12 points, two ids exchanged", 12, exchanged, 99.0, 0.4),
+        ("8 points, two gross", 8, gross::<2>, 99.7, 0.1),
+        ("12 points, two gross", 12, gross::<2>, 99.7, 0.1),
+        ("12 points, two ids exchanged", 12, exchanged, 99.4, 0.3),
     ];
     for (seed, (name, count, fault, least, most_wrong)) in (50..).zip(cases) {
         let tally = tally(count, 2, seed, fault);
@@ -219,8 +219,8 @@ fn one_wrong_point_of_six_is_left_out_by_the_node_s_defaults() {
         tally.count(&scene, &seen, &wrong_ids, &estimator);
     }
     let right = report("the node's defaults, 6 points, one gross", &tally);
-    assert!(right >= 97.0);
-    assert!(tally.wrong_but_trusted <= FRAMES / 300);
+    assert!(right >= 99.0);
+    assert!(tally.wrong_but_trusted <= FRAMES / 1000);
 }
 
 #[test]
@@ -295,7 +295,7 @@ fn precise_points_claim_no_more_than_the_others_can_check() {
         println!(
             "two points of {precise_px} px among {weak_px} px, one of them wrong: {accepted} of {FRAMES} accepted, mean NEES {mean:.1}, {wrong} beyond {SAME_POSE}"
         );
-        assert!(accepted > 3000, "silence would prove nothing");
+        assert!(accepted > 2700, "silence would prove nothing");
         // Among equals an error so small passes often enough, with a mean of 18; as claimed it would be 500.
         assert!(mean < 60.0);
     }
@@ -333,4 +333,95 @@ fn a_wrong_point_among_many_is_found_wherever_it_stands_in_the_message() {
     println!("one of 20 points off by 500 px: found in {found} of 200 frames");
     // The rest is refused.
     assert!(found >= 195, "{found}");
+}
+
+/// A beacon off by little: what the node's defaults make of it.
+#[test]
+fn no_healthy_point_is_left_out_in_place_of_the_wrong_one() {
+    let estimator = Estimator::new(EstimatorSettings::default());
+    // Least share of right ones, %, by count and offset: measured, less three standard errors.
+    let cases = [
+        (
+            6,
+            [
+                (3.0, 62.8),
+                (5.0, 52.2),
+                (8.0, 68.4),
+                (15.0, 93.9),
+                (50.0, 99.7),
+            ],
+        ),
+        (
+            8,
+            [
+                (3.0, 75.0),
+                (5.0, 87.1),
+                (8.0, 97.7),
+                (15.0, 99.7),
+                (50.0, 99.7),
+            ],
+        ),
+        (
+            12,
+            [
+                (3.0, 92.7),
+                (5.0, 98.2),
+                (8.0, 99.8),
+                (15.0, 99.8),
+                (50.0, 99.8),
+            ],
+        ),
+    ];
+    for (count, offsets) in cases {
+        for (offset_px, least_right) in offsets {
+            let mut random = ChaCha8Rng::seed_from_u64(110);
+            let mut healthy_left_out = 0;
+            let mut tally = Tally::default();
+            for _ in 0..FRAMES {
+                let scene = scene(count, &mut random);
+                let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+                let wrong = random.random_range(0..count);
+                let angle: f64 = random.random_range(0.0..std::f64::consts::TAU);
+                seen[wrong].pixel.u += offset_px * angle.cos();
+                seen[wrong].pixel.v += offset_px * angle.sin();
+                let wrong_id = seen[wrong].id;
+                if let Ok(found) = solve(&estimator, scene.camera(), &seen, None).result {
+                    healthy_left_out += usize::from(found.excluded.ids().any(|id| id != wrong_id));
+                }
+                tally.count(&scene, &seen, &[wrong_id], &estimator);
+            }
+            let right = report(&format!("{count} points, one off {offset_px} px"), &tally);
+            println!("    a healthy point left out in {healthy_left_out} of {FRAMES}");
+            assert!(right >= least_right, "{right}");
+            assert!(healthy_left_out <= FRAMES / 1000, "{healthy_left_out}");
+        }
+    }
+}
+
+/// Two reflections of the same shift, as of the sun in two beacons: they agree with each other.
+#[test]
+fn two_reflections_of_the_same_shift_are_refused_from_eight_points_on() {
+    let estimator = Estimator::new(EstimatorSettings::default());
+    for count in [6, 8, 12] {
+        let mut random = ChaCha8Rng::seed_from_u64(120);
+        let mut tally = Tally::default();
+        for _ in 0..FRAMES {
+            let scene = scene(count, &mut random);
+            let mut seen = scene.noisy_observations(SIGMA_PX, &mut random);
+            let mut order: Vec<usize> = (0..count).collect();
+            order.shuffle(&mut random);
+            let distance_px = random.random_range(8.0..30.0);
+            let angle: f64 = random.random_range(0.0..std::f64::consts::TAU);
+            for &index in &order[..2] {
+                seen[index].pixel.u += distance_px * angle.cos();
+                seen[index].pixel.v += distance_px * angle.sin();
+            }
+            let wrong_ids = [seen[order[0]].id, seen[order[1]].id];
+            tally.count(&scene, &seen, &wrong_ids, &estimator);
+        }
+        report(&format!("{count} points, two reflections"), &tally);
+        // Of six points four remain without the two, and many attitudes fit four: 3.8 %.
+        let most_wrong = if count == 6 { FRAMES / 20 } else { 0 };
+        assert!(tally.wrong_but_trusted <= most_wrong);
+    }
 }

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses};
-use super::exclude::{self, Suspects};
+use super::exclude::{self, Found, Suspects};
 use super::initialise::{self, linear_rotation};
 use super::lanes::points::{INLINE_POINTS, mean};
 use super::problem::{NEGLIGIBLE, Problem, Room};
@@ -118,7 +118,9 @@ impl Estimator {
     /// judge it by; whether to trust it is [`Solution::is_trusted`] and `ambiguity`.
     ///
     /// When all points together cannot be trusted and `max_outliers` allows it, the pose is that of
-    /// the fewest exclusions that can; [`Solution::excluded`] names the points left out.
+    /// the fewest exclusions that can; [`Solution::excluded`] names the points left out. When more than one
+    /// choice explains the frame, none is made: the solution of all points is returned, not trusted, and
+    /// [`Solution::unclear`] names two points of which either may be wrong.
     ///
     /// # Inputs
     /// * `observations`: each marker once, in any order, finite, sigmas above zero.
@@ -145,14 +147,20 @@ impl Estimator {
         };
         if !is_final && self.settings.max_outliers > 0 {
             let of_all = estimate.as_ref().ok();
-            if let Some(of_others) = self.leave_out(camera, observations, previous, of_all) {
-                estimate = Ok(of_others);
+            match self.leave_out(camera, observations, previous, of_all) {
+                Found::Solution(of_others) => estimate = Ok(of_others),
+                Found::Unclear(ids) => {
+                    if let Ok(of_all) = &mut estimate {
+                        of_all.unclear = ids;
+                    }
+                }
+                Found::Nothing => {}
             }
         }
         estimate
     }
 
-    /// Returns the pose that leaves out the fewest points; none when no hypothesis can be trusted.
+    /// Looks for the fewest points without which the rest can be trusted.
     #[cold]
     fn leave_out(
         &self,
@@ -160,7 +168,7 @@ impl Estimator {
         observations: &[Observation],
         previous: Option<&Rotation3<f64>>,
         of_all: Option<&Solution>,
-    ) -> Option<Solution> {
+    ) -> Found {
         let suspects = self.suspects(camera, observations, of_all, previous);
         let judge = exclude::Judge {
             solve: |points: &[Observation]| {
@@ -398,6 +406,7 @@ impl Estimator {
             initialisation: judged.initialisation,
             ambiguity: judged.ambiguity,
             excluded: Excluded::default(),
+            unclear: Excluded::default(),
         })
     }
 }

@@ -178,6 +178,8 @@ pub struct Solution {
     pub ambiguity: f64,
     /// Points left out as wrong.
     pub excluded: Excluded,
+    /// Two points of which either may be wrong; empty unless one is and it is not clear which.
+    pub unclear: Excluded,
 }
 
 impl Solution {

@@ -166,8 +166,9 @@ pub enum Refusal {
     },
     /// The residuals are larger than the sigmas promise.
     #[error(
-        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): a wrong detection or id, or a sigma too small?",
-        digits(*rms_px)
+        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): {}",
+        digits(*rms_px),
+        what_is_wrong(unclear)
     )]
     NotTrusted {
         /// Of the best fit.
@@ -178,6 +179,8 @@ pub enum Refusal {
         degrees_of_freedom: u16,
         /// Of the best fit, px.
         rms_px: f64,
+        /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
+        unclear: Vec<u32>,
     },
     /// A second pose fits nearly as well.
     #[error(
@@ -293,6 +296,15 @@ impl FrameOutcome {
     }
 }
 
+fn what_is_wrong(unclear: &[u32]) -> String {
+    match unclear {
+        [a, b] => format!(
+            "a wrong detection, and it is not clear which: without id {a} or without id {b} the rest agrees"
+        ),
+        _ => "a wrong detection or id, or a sigma too small?".to_owned(),
+    }
+}
+
 /// degrees; within it the true error follows the covariance, beyond it the projection bends too much.
 const MAX_ATTITUDE_SIGMA_DEG: f64 = 10.0;
 
@@ -303,6 +315,7 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
             limit: solution.chi_squared_limit,
             degrees_of_freedom: solution.degrees_of_freedom,
             rms_px: solution.rms_px,
+            unclear: solution.unclear.ids().collect(),
         });
     }
     if !solution.covariance.is_valid() {

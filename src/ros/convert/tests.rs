@@ -29,6 +29,7 @@ fn solution() -> Solution {
         chi_squared_limit: 26.1,
         initialisation: Initialisation::Dlt,
         excluded: Excluded::default(),
+        unclear: Excluded::default(),
     }
 }
 
