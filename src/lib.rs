@@ -28,10 +28,12 @@ pub mod geometry;
 pub mod picture;
 pub mod pipeline;
 pub mod refuelling;
+#[cfg(feature = "ros")]
 pub mod ros;
 pub mod simulation;
 pub mod target;
 mod text;
-pub mod text_file;
 pub mod tracking;
 pub mod yaml;
+
+pub use ros2_node::text_file;

@@ -1,27 +1,19 @@
 //! Raw parameters -> checked settings.
 //!
-//! `table` is the one list of parameters with their defaults and ranges; `check` holds a value against
-//! it; `parameters` keeps checked values; `configuration` makes of them what the floors below work with. Knows `estimation` and `tracking`; never
+//! `table` is the one list of parameters with their defaults and ranges; [`Parameters`] keeps values that were held
+//! against it; `configuration` makes of them what the floors below work with. Knows `estimation` and `tracking`; never
 //! a file, a topic or where a value came from.
 
-mod check;
 mod configuration;
 mod consumers;
-mod parameters;
-#[cfg(test)]
-pub(crate) mod sample;
-mod spec;
 mod table;
 #[cfg(test)]
 mod tests;
-mod value;
 
 pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
 pub use consumers::{AttitudeSource, ConsumerConfiguration, OutputError};
-pub use parameters::Parameters;
-pub use spec::{Kind, ParameterSpec};
+pub use ros2_node::parameters::{Kind, ParameterError, ParameterSpec, ParameterValue, Parameters};
 pub use table::TABLE;
-pub use value::{ParameterError, ParameterValue};
 
 use crate::estimation::EstimatorSettings;
 use crate::tracking::FilterSettings;

@@ -1,6 +1,6 @@
 //! The one list of parameters: names, types, defaults, ranges, descriptions.
 
-use super::spec::{Kind, ParameterSpec};
+use super::{Kind, ParameterSpec};
 
 const fn angle(name: &'static str, description: &'static str) -> ParameterSpec {
     let kind = Kind::Double {

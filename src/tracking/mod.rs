@@ -9,8 +9,8 @@
 //! ```
 //!
 //! The state is [`Motion`](crate::geometry::Motion) of the tanker in the camera: pose, velocity and
-//! rate in camera axes, which go on unchanged except for white noise of acceleration ([`model`]); when
-//! several innovations lean to one side the noise is raised for a while ([`lag`]). Before
+//! rate in camera axes, which go on unchanged except for white noise of acceleration (`model`); when
+//! several innovations lean to one side the noise is raised for a while (`lag`). Before
 //! [`FilterSettings::confirm_frames`] consistent frames there is a candidate and no track, and nothing
 //! is given out. [`FilterSettings::max_gap_s`] after the last accepted frame the track is dropped; its [`LastMotion`] can be kept.
 

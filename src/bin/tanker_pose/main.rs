@@ -1,13 +1,19 @@
-//! `tanker_pose`: tools around the node, one file a subcommand.
+//! `tanker_pose`: tools around the node, one file a subcommand. Those that talk ROS need the feature `ros`.
 
+#[cfg(feature = "ros")]
 mod demo;
 mod options;
+#[cfg(feature = "ros")]
 mod parameters;
 mod reproduce;
+#[cfg(feature = "ros")]
 mod ros_options;
+#[cfg(feature = "ros")]
 mod simulate;
 mod solve;
+#[cfg(feature = "ros")]
 mod terminal;
+#[cfg(feature = "ros")]
 mod watch;
 
 use std::process::ExitCode;
@@ -26,9 +32,13 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Tool {
+    #[cfg(feature = "ros")]
     Demo(demo::Arguments),
+    #[cfg(feature = "ros")]
     Simulate(simulate::Arguments),
+    #[cfg(feature = "ros")]
     Parameters(parameters::Arguments),
+    #[cfg(feature = "ros")]
     Watch(watch::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(solve::Arguments),
@@ -38,9 +48,13 @@ enum Tool {
 
 fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().tool {
+        #[cfg(feature = "ros")]
         Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "ros")]
         Tool::Simulate(arguments) => simulate::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "ros")]
         Tool::Parameters(arguments) => parameters::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "ros")]
         Tool::Watch(arguments) => watch::run(&arguments).map_err(Into::into),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
         Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),

@@ -1,4 +1,4 @@
-//! The ROS messages this package speaks, as serde structs in the order of their `.msg` files.
+//! The ROS messages this package speaks beside those of every node, as serde structs in the order of their `.msg` files.
 //!
 //! CDR carries no field names: the order of the fields here **is** the wire format, so a field is
 //! never moved without its `.msg` file. Nothing is checked here: a decoded message may hold anything
@@ -9,8 +9,6 @@ use serde::{Deserialize, Serialize};
 mod detectors;
 mod estimator_status;
 mod flight_stacks;
-mod lifecycle;
-mod parameters;
 mod receptacle_state;
 mod standard;
 mod visualization;
@@ -18,19 +16,10 @@ mod visualization;
 pub use detectors::*;
 pub use estimator_status::EstimatorStatus;
 pub use flight_stacks::*;
-pub use lifecycle::*;
-pub use parameters::*;
 pub use receptacle_state::ReceptacleState;
+pub use ros2_node::messages::*;
 pub use standard::*;
 pub use visualization::*;
-
-/// A message type's place in the ROS type system: `package/msg/name`.
-pub trait Message: Serialize + for<'de> Deserialize<'de> + 'static {
-    /// ROS package that defines the message.
-    const PACKAGE: &'static str;
-    /// Name of the message in its package.
-    const NAME: &'static str;
-}
 
 /// `tanker_pose/FeaturePoint`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -70,10 +59,6 @@ ros_message!(
     "sensor_msgs" / CameraInfo,
     "tf2_msgs" / TFMessage,
     "diagnostic_msgs" / DiagnosticArray,
-    "lifecycle_msgs" / TransitionEvent,
-    "rcl_interfaces" / ParameterEvent,
-    "rosgraph_msgs" / Clock,
-    "std_msgs" / Header,
     "visualization_msgs" / MarkerArray,
     "vision_msgs" / Detection2DArray,
     "apriltag_msgs" / AprilTagDetectionArray,

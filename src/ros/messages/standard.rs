@@ -3,34 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
-// ---- builtin_interfaces, std_msgs --------------------------------------------------------------
-
-/// `builtin_interfaces/Time`: kept as its two fields, so that a stamp passes through bit for bit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Time {
-    /// Whole seconds.
-    pub sec: i32,
-    /// Nanoseconds on top, below 1e9 in a well-formed stamp.
-    pub nanosec: u32,
-}
-
-/// `builtin_interfaces/Duration`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Duration {
-    /// Whole seconds.
-    pub sec: i32,
-    /// Nanoseconds on top, below 1e9.
-    pub nanosec: u32,
-}
-
-/// `std_msgs/Header`.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Header {
-    /// When the data was true.
-    pub stamp: Time,
-    /// The frame that the data is expressed in.
-    pub frame_id: String,
-}
+use super::Header;
 
 // ---- geometry_msgs, tf2_msgs -------------------------------------------------------------------
 
@@ -164,7 +137,7 @@ pub struct TFMessage {
     pub transforms: Vec<TransformStamped>,
 }
 
-// ---- nav_msgs, std_srvs ------------------------------------------------------------------------
+// ---- nav_msgs ----------------------------------------------------------------------------------
 
 /// `nav_msgs/Odometry`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -177,22 +150,6 @@ pub struct Odometry {
     pub pose: PoseWithCovariance,
     /// The child's twist against the frame of the header, in the axes of the child.
     pub twist: TwistWithCovariance,
-}
-
-/// Request of `std_srvs/Trigger`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct TriggerRequest {
-    /// Nothing: ROS has no empty messages.
-    pub structure_needs_at_least_one_member: u8,
-}
-
-/// Response of `std_srvs/Trigger`.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct TriggerResponse {
-    /// Whether it was done.
-    pub success: bool,
-    /// For people.
-    pub message: String,
 }
 
 // ---- sensor_msgs -------------------------------------------------------------------------------

@@ -136,7 +136,7 @@ pub fn id(of_endpoint: &[u8]) -> ParticipantId {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::messages::{Clock, Header, ParameterEvent, TransitionEvent};
+    use crate::messages::{Clock, Header, ParameterEvent, TransitionEvent};
 
     fn event() -> String {
         type_on_the_wire::<TransitionEvent>()

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::arguments::ParameterSource;
 use super::parameter_file::{self, FileParameter, ParameterFileError, Section};
-use crate::config::ParameterValue;
+use crate::parameters::ParameterValue;
 
 /// The pattern that stands for all nodes.
 const EVERY_NODE: &str = "/**";

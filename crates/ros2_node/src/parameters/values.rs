@@ -150,7 +150,7 @@ fn unreachable_kind(name: &str, found: Option<&ParameterValue>) -> ! {
 mod tests {
     use super::ParameterValue::{Bool, Double, Integer, String};
     use super::*;
-    use crate::config::sample::SAMPLE;
+    use crate::parameters::sample::SAMPLE;
 
     fn set(name: &str, value: ParameterValue) -> Result<ParameterValue, ParameterError> {
         let mut parameters = Parameters::new(SAMPLE);

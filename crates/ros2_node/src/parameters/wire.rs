@@ -1,9 +1,9 @@
 //! Values and descriptions of parameters as messages, and values back.
 
-use crate::config::{Kind, ParameterValue};
-use crate::ros::messages::{
+use crate::messages::{
     FloatingPointRange, IntegerRange, ParameterDescriptor, WireParameter, WireValue, parameter_type,
 };
+use crate::parameters::{Kind, ParameterValue};
 
 /// Returns a value as the wire has it.
 pub fn value_message(value: &ParameterValue) -> WireValue {

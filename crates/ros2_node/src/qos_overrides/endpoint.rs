@@ -5,8 +5,8 @@ use std::time::Duration;
 use ros2_client::qos::{Durability, History, Reliability, WhenFull};
 
 use super::PREFIX;
-use crate::config::{Kind, ParameterValue};
-use crate::ros::participant::QosProfile;
+use crate::parameters::{Kind, ParameterValue};
+use crate::participant::QosProfile;
 
 /// What ROS's files say for "as it is".
 const SYSTEM_DEFAULT: &str = "system_default";

@@ -12,12 +12,12 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::SharedParameters;
-use crate::ros::clock::NodeClock;
-use crate::ros::messages::{
+use crate::clock::NodeClock;
+use crate::messages::{
     Assignments, ListRequest, Names, ParameterEvent, SetParametersResult, WireParameter,
 };
-use crate::ros::participant::{EndpointError, QosProfile, RosNode, reliable};
-use crate::ros::service::Service;
+use crate::participant::{EndpointError, QosProfile, RosNode, reliable};
+use crate::service::Service;
 
 const PACKAGE: &str = "rcl_interfaces";
 /// As `rmw_qos_profile_parameter_events` has it.

@@ -7,12 +7,12 @@ use serde::de::DeserializeOwned;
 
 use super::states::{GRAPH, State, Transition};
 use super::{Request, SharedState};
-use crate::ros::messages::{
+use crate::messages::{
     ChangeStateRequest, ChangeStateResponse, EmptyRequest, LifecycleState, LifecycleTransition,
     TransitionDescription, TransitionEvent,
 };
-use crate::ros::participant::{EndpointError, RosNode};
-use crate::ros::service::Service;
+use crate::participant::{EndpointError, RosNode};
+use crate::service::Service;
 
 const PACKAGE: &str = "lifecycle_msgs";
 

@@ -215,7 +215,7 @@ impl Arguments {
             return Err(ArgumentError::Value {
                 argument: "--enclave",
                 value,
-                reason: "expected names with slashes before them, as in /left/camera".to_owned(),
+                reason: "expected names with slashes before them, as in /left/lidar".to_owned(),
             });
         }
         self.rosout_logs = ros.logging_output.rosout.unwrap_or(true);
@@ -250,7 +250,7 @@ impl ValueKind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::ParameterValue;
+    use crate::parameters::ParameterValue;
 
     fn parse(arguments: &[&str]) -> Result<Command, ArgumentError> {
         let arguments: Vec<_> = arguments
@@ -277,9 +277,9 @@ mod tests {
             "-r",
             "__ns:=/uav1",
             "-r",
-            "pose:=a",
+            "scan:=a",
             "-p",
-            "max_outliers:=1",
+            "retries:=1",
             "--params-file",
             "a.yaml",
             "--params-file",
@@ -304,7 +304,7 @@ mod tests {
             [
                 ParameterSource::Assignment(Assignment {
                     node: None,
-                    name: "max_outliers".to_owned(),
+                    name: "retries".to_owned(),
                     value: Some(ParameterValue::Integer(1)),
                 }),
                 ParameterSource::File(PathBuf::from("a.yaml")),
@@ -325,7 +325,7 @@ mod tests {
         let command = parse(&[
             "--ros-args",
             "--log-file-name",
-            "tanker",
+            "driver",
             "--log-level",
             "UNSET",
             "--log-level",
@@ -353,11 +353,11 @@ mod tests {
             &["--ros-args", "-p", "a:="],
             &["--ros-args", "-p", ":=1"],
             &["--ros-args", "-p", "/**:a:=1"],
-            &["--ros-args", "-p", "/tanker_pose:a:=1"],
+            &["--ros-args", "-p", "/sensor_driver:a:=1"],
             &["--ros-args", "-p", "a:=@x"],
             &["--ros-args", "--log-file-name"],
             &["--ros-args", "-r", "a"],
-            &["--ros-args", "-r", "/**:pose:=a"],
+            &["--ros-args", "-r", "/**:scan:=a"],
             &["--ros-args", "-e", "left"],
             &["--ros-args", "--log-level", "loud"],
             &["--ros-args", "--bogus"],

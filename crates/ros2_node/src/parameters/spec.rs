@@ -68,6 +68,13 @@ impl Kind {
     }
 }
 
+/// As every ROS node has it: whether its time comes from `/clock`.
+pub const USE_SIM_TIME: ParameterSpec = ParameterSpec::bool(
+    "use_sim_time",
+    false,
+    "take the time from /clock, as in a simulation",
+);
+
 /// One parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterSpec {
@@ -82,6 +89,81 @@ pub struct ParameterSpec {
 }
 
 impl ParameterSpec {
+    /// Returns a parameter that is true or false.
+    #[must_use]
+    pub const fn bool(name: &'static str, default: bool, description: &'static str) -> Self {
+        Self::new(name, Kind::Bool { default }, description)
+    }
+
+    /// Returns a parameter that is a whole number within these bounds.
+    #[must_use]
+    pub const fn integer(
+        name: &'static str,
+        default: i64,
+        [min, max]: [i64; 2],
+        description: &'static str,
+    ) -> Self {
+        Self::new(name, Kind::Integer { default, min, max }, description)
+    }
+
+    /// Returns a parameter that is a finite number within these bounds.
+    #[must_use]
+    pub const fn double(
+        name: &'static str,
+        default: f64,
+        [min, max]: [f64; 2],
+        description: &'static str,
+    ) -> Self {
+        Self::new(name, Kind::Double { default, min, max }, description)
+    }
+
+    /// Returns a parameter that is one of these words.
+    #[must_use]
+    pub const fn choice(
+        name: &'static str,
+        default: &'static str,
+        allowed: &'static [&'static str],
+        description: &'static str,
+    ) -> Self {
+        Self::new(name, Kind::Choice { default, allowed }, description)
+    }
+
+    /// Returns a parameter that is text.
+    #[must_use]
+    pub const fn text(
+        name: &'static str,
+        default: &'static str,
+        description: &'static str,
+    ) -> Self {
+        Self::new(name, Kind::Text { default }, description)
+    }
+
+    /// Returns a parameter that is the name of a tf2 frame.
+    #[must_use]
+    pub const fn frame_id(
+        name: &'static str,
+        default: &'static str,
+        description: &'static str,
+    ) -> Self {
+        Self::new(name, Kind::FrameId { default }, description)
+    }
+
+    const fn new(name: &'static str, kind: Kind, description: &'static str) -> Self {
+        Self {
+            name,
+            kind,
+            read_only: false,
+            description,
+        }
+    }
+
+    /// Returns this parameter, fixed once the node runs.
+    #[must_use]
+    pub const fn read_only(mut self) -> Self {
+        self.read_only = true;
+        self
+    }
+
     /// Returns the value that holds unless another is set.
     #[must_use]
     pub fn default(&self) -> ParameterValue {

@@ -4,7 +4,7 @@ use super::arguments::Arguments;
 use super::overrides::{Override, Overrides, Place};
 use super::parameter_file::ParameterFileError;
 use super::qos_overrides::{self, QosOverrideError, QosOverrides};
-use crate::config::{ParameterError, ParameterValue, Parameters};
+use crate::parameters::{ParameterError, ParameterValue, Parameters};
 use crate::text::clip;
 
 /// Why the parameters given at the start cannot be used.
@@ -192,7 +192,7 @@ mod tests {
     use super::super::participant::reliable;
     use super::super::qos_overrides::{Endpoint, Role};
     use super::*;
-    use crate::config::sample::SAMPLE;
+    use crate::parameters::sample::SAMPLE;
 
     fn arguments(arguments: &[&str]) -> Arguments {
         let all: Vec<String> = ["--ros-args"]
@@ -250,11 +250,11 @@ mod tests {
 
     #[test]
     fn qos_of_own_topics_is_overridden_and_that_of_others_is_warned_of() {
-        let pose = Endpoint::new("/pose".into(), Role::Publisher, &reliable(50));
-        let qos = QosOverrides::new(vec![pose]);
+        let scan = Endpoint::new("/scan".into(), Role::Publisher, &reliable(50));
+        let qos = QosOverrides::new(vec![scan]);
         let given = arguments(&[
             "-p",
-            "qos_overrides./pose.publisher.depth:=1",
+            "qos_overrides./scan.publisher.depth:=1",
             "-p",
             "qos_overrides./image.publisher.depth:=2",
         ]);
@@ -262,7 +262,7 @@ mod tests {
             start_values(&given, "/n", Parameters::new(SAMPLE), qos.clone()).expect("valid");
         let default = reliable(50);
         assert_eq!(
-            found.qos.profile("/pose", Role::Publisher, &default),
+            found.qos.profile("/scan", Role::Publisher, &default),
             reliable(1)
         );
         assert_eq!(found.warnings.len(), 1);
@@ -273,17 +273,17 @@ mod tests {
         );
 
         let mut found = found;
-        found.leave_topics(&["/pose".to_owned()]);
+        found.leave_topics(&["/scan".to_owned()]);
         assert_eq!(found.warnings.len(), 1, "it is open");
         found.leave_topics(&[]);
         assert_eq!(found.qos.iter().count(), 0);
         assert!(
-            found.warnings[1].contains("/pose.publisher.depth"),
+            found.warnings[1].contains("/scan.publisher.depth"),
             "{}",
             found.warnings[1]
         );
 
-        let given = arguments(&["-p", "qos_overrides./pose.publisher.depth:=none"]);
+        let given = arguments(&["-p", "qos_overrides./scan.publisher.depth:=none"]);
         let refused = start_values(&given, "/n", Parameters::new(SAMPLE), qos)
             .expect_err("a word is no depth");
         assert!(

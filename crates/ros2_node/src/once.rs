@@ -51,7 +51,7 @@ impl<Fault: Copy + Ord> SaidOnce<Fault> {
 mod tests {
     use super::*;
 
-    /// One frame of a 50 Hz camera.
+    /// One frame of a 50 Hz lidar.
     const FRAME: Duration = Duration::from_millis(20);
 
     #[test]

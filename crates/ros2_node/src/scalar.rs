@@ -1,6 +1,6 @@
 //! What an unquoted word means as a parameter: rcl's rules, which are those of C and of YAML 1.1.
 
-use crate::config::ParameterValue;
+use crate::parameters::ParameterValue;
 
 const TRUE: [&str; 11] = [
     "y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON",

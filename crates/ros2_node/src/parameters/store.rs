@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::wire::{descriptor, parameter_message, plain_value, type_of, value_message};
-use crate::config::{ParameterValue, Parameters};
-use crate::ros::messages::{
+use crate::messages::{
     ListRequest, ListResult, ParameterDescriptor, SetParametersResult, WireParameter, WireValue,
 };
-use crate::ros::qos_overrides::{QosOverrides, QosParameter};
+use crate::parameters::{ParameterValue, Parameters};
+use crate::qos_overrides::{QosOverrides, QosParameter};
 use crate::text::{echoed, quoted};
 
 /// The parameters of a running node, shared with its parameter services.
@@ -216,17 +216,17 @@ fn is_listed(name: &str, request: &ListRequest) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Kind;
-    use crate::config::sample::SAMPLE;
-    use crate::ros::participant::reliable;
-    use crate::ros::qos_overrides::{Endpoint, Role};
+    use crate::parameters::Kind;
+    use crate::parameters::sample::SAMPLE;
+    use crate::participant::reliable;
+    use crate::qos_overrides::{Endpoint, Role};
 
-    const DEPTH: &str = "qos_overrides./pose.publisher.depth";
+    const DEPTH: &str = "qos_overrides./scan.publisher.depth";
 
     fn shared() -> (SharedParameters, smol::channel::Receiver<()>) {
-        let pose = Endpoint::new("/pose".into(), Role::Publisher, &reliable(50));
+        let scan = Endpoint::new("/scan".into(), Role::Publisher, &reliable(50));
         let parameters = Parameters::new(SAMPLE);
-        SharedParameters::new(parameters, &QosOverrides::new(vec![pose]), |changed| {
+        SharedParameters::new(parameters, &QosOverrides::new(vec![scan]), |changed| {
             if changed.bool("filtered") && changed.text("mode") == "careful" {
                 return Err("filtered and careful exclude each other".to_owned());
             }
@@ -313,7 +313,7 @@ mod tests {
         };
         let all = list(&[], 0);
         assert_eq!(all.names.len(), SAMPLE.len() + 5);
-        assert_eq!(all.prefixes, ["qos_overrides./pose.publisher"]);
+        assert_eq!(all.prefixes, ["qos_overrides./scan.publisher"]);
         assert_eq!(
             list(&[], 1).names.len(),
             SAMPLE.len(),

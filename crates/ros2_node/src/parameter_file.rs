@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use granit_parser::{Event, Parser, ScalarStyle, ScanError, Tag};
 
 use super::{rules, scalar};
-use crate::config::ParameterValue;
+use crate::parameters::ParameterValue;
 use crate::text::clip;
 
 /// The parameters that stand under one node name or pattern.
@@ -390,17 +390,17 @@ mod tests {
     const FILE: &str = "\
 /**:
   ros__parameters: {everywhere: 1}
-tanker_pose:
+sensor_driver:
   ros__parameters:
     root_only: 2
-/uav1/tanker_pose:
+/uav1/sensor_driver:
   ros__parameters:
     absolute: 3
 uav1:
-  tanker_pose:
+  sensor_driver:
     ros__parameters:
       nested: 4
-/*/tanker_pose:
+/*/sensor_driver:
   ros__parameters:
     one_level: 5
 ";
@@ -413,10 +413,10 @@ uav1:
             patterns,
             [
                 "/**",
-                "/tanker_pose",
-                "/uav1/tanker_pose",
-                "/uav1/tanker_pose",
-                "/*/tanker_pose"
+                "/sensor_driver",
+                "/uav1/sensor_driver",
+                "/uav1/sensor_driver",
+                "/*/sensor_driver"
             ]
         );
         assert!(!found[0].names_one_node() && found[1].names_one_node());
@@ -425,8 +425,8 @@ uav1:
     #[test]
     fn empty_files_and_sections_say_nothing() {
         assert_eq!(parsed("").expect("valid"), []);
-        assert_eq!(parsed("tanker_pose:\n").expect("valid"), []);
-        let found = parsed("tanker_pose:\n  ros__parameters:\n").expect("valid");
+        assert_eq!(parsed("sensor_driver:\n").expect("valid"), []);
+        let found = parsed("sensor_driver:\n  ros__parameters:\n").expect("valid");
         assert_eq!(found[0].parameters, []);
     }
 
@@ -445,7 +445,7 @@ uav1:
     #[test]
     fn a_section_that_no_node_can_have_is_refused_and_not_passed_over() {
         let text = |name| format!("{name}:\n  ros__parameters:\n    a: 1\n");
-        for name in ["tanker_*", "/n/", "//n", "n m", "1n", "n.m"] {
+        for name in ["sensor_*", "/n/", "//n", "n m", "1n", "n.m"] {
             let error = parsed(&text(name)).expect_err(name);
             assert!(error.to_string().contains("is no node's name"), "{error}");
         }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::ros::messages::Time;
+use crate::messages::Time;
 
 /// s; a gap by which stamps may run ahead of the node's own seconds. Fast replay and late starts stay below it.
 const AHEAD_S: f64 = 10.0;

@@ -1,12 +1,12 @@
 //! Quality of service by parameters, under the names that all of ROS has for it:
-//! `qos_overrides./pose.publisher.reliability`.
+//! `qos_overrides./scan.publisher.reliability`.
 
 mod endpoint;
 
 pub use endpoint::{Endpoint, Role};
 
 use super::participant::QosProfile;
-use crate::config::{Kind, ParameterValue};
+use crate::parameters::{Kind, ParameterValue};
 use crate::text::quoted;
 use endpoint::Policy;
 
@@ -157,7 +157,7 @@ mod tests {
     fn overrides() -> QosOverrides {
         QosOverrides::new(vec![
             Endpoint::new("/points".into(), Role::Subscription, &sensor_data(10)),
-            Endpoint::new("/pose".into(), Role::Publisher, &reliable(50)),
+            Endpoint::new("/scan".into(), Role::Publisher, &reliable(50)),
         ])
     }
 
@@ -174,7 +174,7 @@ mod tests {
             ("depth", ParameterValue::Integer(3)),
             ("deadline", ParameterValue::Integer(20_000_000)),
         ] {
-            let name = format!("qos_overrides./pose.publisher.{policy}");
+            let name = format!("qos_overrides./scan.publisher.{policy}");
             assert_eq!(overrides.set(&name, &value), Ok(true));
         }
         let expected = reliable(3)
@@ -183,11 +183,11 @@ mod tests {
             .deadline(Some(Duration::from_millis(20)));
         let default = reliable(50);
         assert_eq!(
-            overrides.profile("/pose", Role::Publisher, &default),
+            overrides.profile("/scan", Role::Publisher, &default),
             expected
         );
         assert_eq!(
-            overrides.profile("/pose", Role::Subscription, &default),
+            overrides.profile("/scan", Role::Subscription, &default),
             default
         );
         let points = sensor_data(10);
@@ -201,12 +201,12 @@ mod tests {
     fn system_default_leaves_a_policy_as_it_is() {
         let mut overrides = overrides();
         for policy in ["reliability", "durability", "history"] {
-            let name = format!("qos_overrides./pose.publisher.{policy}");
+            let name = format!("qos_overrides./scan.publisher.{policy}");
             assert_eq!(overrides.set(&name, &text("system_default")), Ok(true));
         }
         let default = reliable(50);
         let other = sensor_data(1);
-        assert_eq!(overrides.profile("/pose", Role::Publisher, &other), default);
+        assert_eq!(overrides.profile("/scan", Role::Publisher, &other), default);
     }
 
     #[test]
@@ -218,13 +218,13 @@ mod tests {
                     "depth" => ParameterValue::Integer(7),
                     _ => text("keep_all"),
                 };
-                let name = format!("qos_overrides./pose.publisher.{policy}");
+                let name = format!("qos_overrides./scan.publisher.{policy}");
                 assert_eq!(overrides.set(&name, &value), Ok(true));
             }
-            let profile = overrides.profile("/pose", Role::Publisher, &reliable(1));
+            let profile = overrides.profile("/scan", Role::Publisher, &reliable(1));
             assert_eq!(profile.history, History::KeepAll);
             assert!(overrides.iter().any(|parameter| {
-                parameter.name.ends_with("/pose.publisher.depth")
+                parameter.name.ends_with("/scan.publisher.depth")
                     && parameter.value == ParameterValue::Integer(7)
             }));
         }
@@ -239,31 +239,31 @@ mod tests {
         };
         assert_eq!(
             refusal(
-                "qos_overrides./pose.publisher.reliability",
+                "qos_overrides./scan.publisher.reliability",
                 &text("sometimes")
             ),
-            "parameter \"qos_overrides./pose.publisher.reliability\" must be \
+            "parameter \"qos_overrides./scan.publisher.reliability\" must be \
              one of reliable, best_effort, system_default, got \"sometimes\" (string)"
         );
         assert_eq!(
             refusal(
-                "qos_overrides./pose.publisher.depth",
+                "qos_overrides./scan.publisher.depth",
                 &ParameterValue::Integer(0)
             ),
-            "parameter \"qos_overrides./pose.publisher.depth\" must be \
+            "parameter \"qos_overrides./scan.publisher.depth\" must be \
              an integer from 1 to 10000, got 0 (integer)"
         );
-        refusal("qos_overrides./pose.publisher.depth", &text("3"));
+        refusal("qos_overrides./scan.publisher.depth", &text("3"));
         refusal(
-            "qos_overrides./pose.publisher.deadline",
+            "qos_overrides./scan.publisher.deadline",
             &ParameterValue::Integer(-1),
         );
         refusal(
-            "qos_overrides./pose.subscription.depth",
+            "qos_overrides./scan.subscription.depth",
             &ParameterValue::Integer(1),
         );
         refusal(
-            "qos_overrides./pose.publisher.lifespan",
+            "qos_overrides./scan.publisher.lifespan",
             &ParameterValue::Integer(1),
         );
         let foreign = "qos_overrides./image.publisher.depth";

@@ -175,78 +175,79 @@ mod tests {
     use super::*;
 
     fn rule(text: &str) -> RemapRule {
-        crate::ros::rules::remap(text).expect("the rule is well formed")
+        crate::rules::remap(text).expect("the rule is well formed")
     }
 
     fn names(rules: &[&str]) -> NodeNames {
         let rules: Vec<_> = rules.iter().map(|text| rule(text)).collect();
-        NodeNames::new("tanker_pose", &rules).expect("the rules are valid")
+        NodeNames::new("sensor_driver", &rules).expect("the rules are valid")
     }
 
     #[test]
     fn relative_private_and_absolute_names_expand_as_in_rcl() {
-        let names = names(&["__ns:=/uav1", "__node:=estimator"]);
-        assert_eq!(names.fully_qualified(), "/uav1/estimator");
-        assert_eq!(names.topic("pose").expect("valid"), "/uav1/pose");
-        assert_eq!(
-            names.topic("~/pose").expect("valid"),
-            "/uav1/estimator/pose"
-        );
+        let names = names(&["__ns:=/uav1", "__node:=driver"]);
+        assert_eq!(names.fully_qualified(), "/uav1/driver");
+        assert_eq!(names.topic("scan").expect("valid"), "/uav1/scan");
+        assert_eq!(names.topic("~/scan").expect("valid"), "/uav1/driver/scan");
         assert_eq!(names.topic("/tf").expect("valid"), "/tf");
     }
 
     #[test]
     fn root_namespace_gives_one_slash() {
-        assert_eq!(names(&[]).topic("pose").expect("valid"), "/pose");
+        assert_eq!(names(&[]).topic("scan").expect("valid"), "/scan");
     }
 
     #[test]
     fn namespaced_remap_applies_to_relative_topic() {
         let names = names(&[
             "__ns:=/uav1",
-            "pose:=tanker/pose",
-            "camera_info:=/camera/camera_info",
+            "scan:=filtered/scan",
+            "lidar_info:=/lidar/lidar_info",
         ]);
-        assert_eq!(names.topic("pose").expect("valid"), "/uav1/tanker/pose");
+        assert_eq!(names.topic("scan").expect("valid"), "/uav1/filtered/scan");
         assert_eq!(
-            names.topic("camera_info").expect("valid"),
-            "/camera/camera_info"
+            names.topic("lidar_info").expect("valid"),
+            "/lidar/lidar_info"
         );
     }
 
     #[test]
     fn remap_matches_expanded_names_not_texts() {
-        let names = names(&["__ns:=/uav1", "/uav1/pose:=a", "/tf:=tf"]);
-        assert_eq!(names.topic("pose").expect("valid"), "/uav1/a");
+        let names = names(&["__ns:=/uav1", "/uav1/scan:=a", "/tf:=tf"]);
+        assert_eq!(names.topic("scan").expect("valid"), "/uav1/a");
         assert_eq!(names.topic("/tf").expect("valid"), "/uav1/tf");
     }
 
     #[test]
     fn first_matching_rule_wins_and_is_not_applied_twice() {
-        let names = names(&["pose:=status", "pose:=other", "status:=pose"]);
-        assert_eq!(names.topic("pose").expect("valid"), "/status");
-        assert_eq!(names.topic("status").expect("valid"), "/pose");
+        let names = names(&["scan:=status", "scan:=other", "status:=scan"]);
+        assert_eq!(names.topic("scan").expect("valid"), "/status");
+        assert_eq!(names.topic("status").expect("valid"), "/scan");
     }
 
     #[test]
     fn rules_for_another_node_do_not_apply() {
-        let names = names(&["other:pose:=a", "other:__node:=b", "tanker_pose:status:=c"]);
-        assert_eq!(names.base_name(), "tanker_pose");
-        assert_eq!(names.topic("pose").expect("valid"), "/pose");
+        let names = names(&[
+            "other:scan:=a",
+            "other:__node:=b",
+            "sensor_driver:status:=c",
+        ]);
+        assert_eq!(names.base_name(), "sensor_driver");
+        assert_eq!(names.topic("scan").expect("valid"), "/scan");
         assert_eq!(names.topic("status").expect("valid"), "/c");
     }
 
     #[test]
     fn rostopic_rules_rename_topics_and_rosservice_rules_do_not() {
         let names = names(&[
-            "rostopic://pose:=a",
+            "rostopic://scan:=a",
             "rosservice://status:=b",
-            "tanker_pose:rostopic://~/markers:=c",
+            "sensor_driver:rostopic://~/points:=c",
             "other:rostopic://status:=d",
         ]);
-        assert_eq!(names.topic("pose").expect("valid"), "/a");
+        assert_eq!(names.topic("scan").expect("valid"), "/a");
         assert_eq!(names.topic("status").expect("valid"), "/status");
-        assert_eq!(names.topic("~/markers").expect("valid"), "/c");
+        assert_eq!(names.topic("~/points").expect("valid"), "/c");
     }
 
     #[test]
@@ -258,11 +259,11 @@ mod tests {
             "__node:=1a",
             "__foo:=b",
         ] {
-            let refused = NodeNames::new("tanker_pose", &[rule(wrong)]);
+            let refused = NodeNames::new("sensor_driver", &[rule(wrong)]);
             assert!(refused.is_err(), "{wrong}");
         }
         // Two underscores in a row are allowed by ROS, and would make the client library panic later.
-        let doubled = NodeNames::new("tanker_pose", &[rule("__node:=a__b")]);
+        let doubled = NodeNames::new("sensor_driver", &[rule("__node:=a__b")]);
         assert!(doubled.is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! Log messages to the console as ROS nodes print them, and to /rosout.
 //!
-//! The library below only uses the `log` crate; where its lines go is decided here.
+//! Libraries only use the `log` crate; where their lines go is decided here.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,6 +22,8 @@ use crate::text;
 /// `ROS_DISTRO` is an error to it even where both distributions speak alike; [`super::distribution`] tells the two apart.
 const DEFAULT_FILTER: &str = "warn,rustdds=error,rustdds::structure::dds_cache=off,\
     ros2_client=error,ros2_client::distributions=off,cdr_encoding=error";
+/// This crate's own lines are said by the node, too.
+const KIT: &str = "ros2_node";
 /// Where the client library repeats what it published to /rosout.
 const ECHO: &str = "ros2_client::rosout";
 /// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
@@ -83,8 +85,11 @@ fn console(
     let name = logger_name(names);
     let mut builder = env_logger::Builder::new();
     builder.parse_filters(DEFAULT_FILTER);
-    builder.filter(Some(own), LevelFilter::Info);
+    for own in [own, KIT] {
+        builder.filter(Some(own), LevelFilter::Info);
+    }
     if let Some(filters) = variable {
+        builder.parse_filters(&of_this_crate(filters, own));
         builder.parse_filters(filters);
     }
     for (logger, level) in &arguments.log_levels {
@@ -92,10 +97,22 @@ fn console(
             Some(logger) if !is_node(logger, &name, names) => {
                 builder.filter(Some(&logger.replace('.', "::")), *level)
             }
-            _ => builder.filter(Some(own), *level),
+            _ => builder.filter(Some(own), *level).filter(Some(KIT), *level),
         };
     }
     builder
+}
+
+/// Returns for this crate what `filters` say of `own`: to users both are the node.
+fn of_this_crate(filters: &str, own: &str) -> String {
+    let (levels, _) = filters.split_once('/').unwrap_or((filters, ""));
+    let level = |filter: &str| {
+        let level = filter.trim().strip_prefix(own)?;
+        let is_whole = level.is_empty() || level.starts_with('=');
+        is_whole.then(|| format!("{KIT}{level}"))
+    };
+    let all: Vec<String> = levels.split(',').filter_map(level).collect();
+    all.join(",")
 }
 
 /// Sends log messages to /rosout too, from now on.
@@ -158,7 +175,7 @@ fn write_line(
 }
 
 fn is_own(target: &str, own: &str) -> bool {
-    target.starts_with(own)
+    target.starts_with(own) || target.starts_with(KIT)
 }
 
 impl Log for NodeLog {
@@ -217,7 +234,7 @@ mod tests {
     use super::*;
 
     fn names() -> NodeNames {
-        let remap = crate::ros::rules::remap("__ns:=/left").expect("the rule is well formed");
+        let remap = crate::rules::remap("__ns:=/left").expect("the rule is well formed");
         NodeNames::new("sensor", &[remap]).expect("the names are valid")
     }
 
@@ -241,6 +258,7 @@ mod tests {
         };
         assert!(enabled("sensor_driver::device", Level::Debug));
         assert!(enabled("sensor_driver_node", Level::Debug));
+        assert!(enabled("ros2_node::clock", Level::Debug));
         assert!(!enabled("rustdds::rtps", Level::Warn));
         assert!(!enabled("polling", Level::Info));
         assert!(enabled("rustdds::rtps", Level::Error));
@@ -256,7 +274,17 @@ mod tests {
             logger.enabled(&Metadata::builder().target(target).level(level).build())
         };
         assert!(!enabled("sensor_driver", Level::Warn));
+        assert!(enabled("ros2_node", Level::Error));
+        assert!(!enabled("ros2_node", Level::Warn));
         assert!(!enabled("rustdds::discovery", Level::Error));
         assert!(enabled("rustdds::rtps", Level::Warn));
+    }
+
+    #[test]
+    fn the_variable_says_for_this_crate_what_it_says_for_the_node() {
+        let given = "warn, driver=debug,driver::a=off,drivers,ros2_node=info/word";
+        assert_eq!(of_this_crate(given, "driver"), "ros2_node=debug");
+        assert_eq!(of_this_crate("driver", "driver"), "ros2_node");
+        assert_eq!(of_this_crate("info", "driver"), "");
     }
 }

@@ -56,6 +56,12 @@ impl Lifecycle {
         Ok((lifecycle, requests))
     }
 
+    /// Returns where the node stands.
+    #[must_use]
+    pub fn state(&self) -> State {
+        self.state.get()
+    }
+
     /// Makes the transition that is asked for and answers whether it was made. `work` does what the state that it is
     /// given is there for.
     pub fn carry_out(&self, request: &Request, mut work: impl FnMut(State) -> WorkResult) {

@@ -7,7 +7,7 @@ use log::LevelFilter;
 use ros2args::RemapRule;
 
 use super::parameter_file;
-use crate::config::ParameterValue;
+use crate::parameters::ParameterValue;
 use crate::text::clip;
 
 /// `-p node:name:=value`.
@@ -105,7 +105,7 @@ pub(super) fn log_level(argument: &str) -> Result<(Option<&str>, Option<LevelFil
     Ok((logger, level))
 }
 
-/// Returns whether ROS takes this for an enclave: a path such as `/left/camera`.
+/// Returns whether ROS takes this for an enclave: a path such as `/left/lidar`.
 pub(super) fn is_enclave(path: &str) -> bool {
     let is_part = |part: &str| {
         !part.starts_with(|first: char| first.is_ascii_digit()) && is_word(part.as_bytes())
@@ -147,7 +147,7 @@ fn check_node(node: Option<&str>) -> Result<(), String> {
     }
 }
 
-/// rcl's lexer takes slashes anywhere in a parameter's name (`qos_overrides./pose.publisher.depth`), and dots between.
+/// rcl's lexer takes slashes anywhere in a parameter's name (`qos_overrides./scan.publisher.depth`), and dots between.
 fn is_parameter(name: &str) -> bool {
     let ends_with_dot = name.starts_with('.') || name.ends_with('.') || name.contains("..");
     let is_part = |part: &str| part.is_empty() || is_token(part);
@@ -178,21 +178,21 @@ mod tests {
 
     #[test]
     fn an_assignment_may_name_a_node_without_its_namespace() {
-        let found = assignment("camera:lens.k1:=0x10").expect("well formed");
+        let found = assignment("lidar:lens.k1:=0x10").expect("well formed");
         let expected = Assignment {
-            node: Some("camera".to_owned()),
+            node: Some("lidar".to_owned()),
             name: "lens.k1".to_owned(),
             value: Some(ParameterValue::Integer(16)),
         };
         assert_eq!(found, expected);
-        for name in ["a", "qos_overrides./pose.publisher.depth", "/a", "a_b.c_1"] {
+        for name in ["a", "qos_overrides./scan.publisher.depth", "/a", "a_b.c_1"] {
             assert!(assignment(&format!("{name}:=1")).is_ok(), "{name}");
         }
     }
 
     #[test]
     fn a_rule_that_is_for_nobody_is_refused() {
-        for target in ["/**:a", "*:a", "/camera:a", "1a:a", "a-b:a", "~:a", ":a"] {
+        for target in ["/**:a", "*:a", "/lidar:a", "1a:a", "a-b:a", "~:a", ":a"] {
             assert!(assignment(&format!("{target}:=1")).is_err(), "{target}");
             assert!(remap(&format!("{target}:=b")).is_err(), "{target}");
         }
@@ -248,7 +248,7 @@ mod tests {
         ] {
             assert!(!is_node_pattern(wrong), "{wrong}");
         }
-        assert!(is_enclave("/") && is_enclave("/left/camera_1"));
+        assert!(is_enclave("/") && is_enclave("/left/lidar_1"));
         for wrong in ["", "a", "/a/", "//a", "/1", "/a-b", "/*"] {
             assert!(!is_enclave(wrong), "{wrong}");
         }

@@ -180,13 +180,13 @@ fn ros_type(on_the_wire: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::participant::{QosProfile, reliable, sensor_data};
+    use crate::participant::{QosProfile, reliable, sensor_data};
 
-    const TYPE: &str = "sensor_msgs::msg::dds_::CameraInfo_";
+    const TYPE: &str = "sensor_msgs::msg::dds_::LaserScan_";
 
     fn own(role: Role, qos: &QosProfile) -> OwnEnd {
         OwnEnd {
-            topic: "/camera_info".into(),
+            topic: "/lidar_info".into(),
             role,
             type_name: TYPE.into(),
             qos: qos.into(),
@@ -195,7 +195,7 @@ mod tests {
 
     fn other(type_name: &str, qos: &QosProfile) -> OtherEnd {
         OtherEnd {
-            topic: "rt/camera_info".into(),
+            topic: "rt/lidar_info".into(),
             type_name: type_name.into(),
             qos: qos.into(),
         }
@@ -238,7 +238,7 @@ mod tests {
             &other("std_msgs::msg::dds_::String_", &reliable(1)),
         );
         assert!(
-            said.contains("sends std_msgs/msg/String, expected sensor_msgs/msg/CameraInfo"),
+            said.contains("sends std_msgs/msg/String, expected sensor_msgs/msg/LaserScan"),
             "{said}"
         );
         let said = words(&listens, &other("a\u{1b}[31m", &reliable(1)));

@@ -1,8 +1,8 @@
 //! A node in the ROS graph: opened from arguments and environment, closed so that others notice.
 //!
 //! ```no_run
-//! use tanker_pose::ros::{arguments::Arguments, environment::Environment, messages::Header};
-//! use tanker_pose::ros::participant::{NodeOptions, RosNode, reliable};
+//! use ros2_node::{arguments::Arguments, environment::Environment, messages::Header};
+//! use ros2_node::participant::{NodeOptions, RosNode, reliable};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let environment = Environment::from_process()?;

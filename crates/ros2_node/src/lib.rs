@@ -1,0 +1,83 @@
+//! What a well-behaved ROS 2 node needs beside [`ros2_client`], the client library in Rust that needs no ROS installation.
+//!
+//! `ros2-client` speaks: topics, services, discovery. What makes a node one that ROS's tools and launch files can work
+//! with is here: the command line, remaps and parameter files as rcl reads them, environment variables, parameters with
+//! descriptions and ranges behind their services, `qos_overrides`, a managed node's lifecycle, `/clock`, `/rosout`, and
+//! leaving so that others notice.
+//!
+//! ```text
+//! arguments, rules                   the command line, and the grammar of one value in it
+//! environment, distribution          what variables ask for; which ROS 2 the build talks with
+//! names                              the node's and its topics' names after remaps
+//! scalar, parameter_file             what words mean; the sections of a parameter file
+//! overrides, start_values            which value counts for a node; all its parameters at the start
+//! parameters, qos_overrides          their declaration; parameters while the node runs, behind their services
+//! clock, jump, system_clock          the node's time, the system's or a simulation's, and where it does not go on
+//! participant, leave                 into the graph, and out of it
+//! lifecycle                          a managed node's states, behind their services
+//! service, rtps                      services, and what of the wire protocol is written here
+//! messages                           the messages of all this, and the trait of all messages
+//! newest                             what is left out when more samples wait than a topic's depth
+//! graph, running_nodes               the other ends of the topics; nodes that are found by what they publish
+//! logging, once                      log lines as ROS has them; what lasts is said once
+//! text, text_file                    foreign words in messages for people; files from outside
+//! ```
+//!
+//! Without the feature `client`, which each feature of a distribution brings, there are only `text`, `text_file` and the
+//! declaration of [`parameters`]: for those parts of a program that know nothing of ROS.
+
+pub mod parameters;
+pub mod text;
+pub mod text_file;
+
+#[cfg(feature = "client")]
+pub use ros2_client;
+
+#[cfg(feature = "client")]
+pub mod arguments;
+#[cfg(feature = "client")]
+pub mod clock;
+#[cfg(feature = "client")]
+pub mod distribution;
+#[cfg(feature = "client")]
+pub mod environment;
+#[cfg(feature = "client")]
+pub mod graph;
+#[cfg(feature = "client")]
+pub mod jump;
+#[cfg(feature = "client")]
+pub mod leave;
+#[cfg(feature = "client")]
+pub mod lifecycle;
+#[cfg(feature = "client")]
+pub mod logging;
+#[cfg(feature = "client")]
+pub mod messages;
+#[cfg(feature = "client")]
+pub mod names;
+#[cfg(feature = "client")]
+pub mod newest;
+#[cfg(feature = "client")]
+pub mod once;
+#[cfg(feature = "client")]
+pub mod overrides;
+#[cfg(feature = "client")]
+pub mod parameter_file;
+#[cfg(feature = "client")]
+pub mod participant;
+#[cfg(feature = "client")]
+pub mod qos_overrides;
+#[cfg(feature = "client")]
+pub mod rtps;
+#[cfg(feature = "client")]
+pub mod rules;
+#[cfg(feature = "client")]
+pub mod running_nodes;
+#[cfg(feature = "client")]
+mod scalar;
+#[cfg(feature = "client")]
+pub mod service;
+#[cfg(feature = "client")]
+pub mod start_values;
+#[cfg(feature = "client")]
+pub mod system_clock;

@@ -1,0 +1,58 @@
+//! Messages that every ROS node speaks, as serde structs in the order of their `.msg` files.
+//!
+//! CDR carries no field names: the order of the fields here **is** the wire format. Nothing is checked here: a decoded
+//! message may hold anything that its bytes can say.
+//!
+//! A message of your own is a struct with the fields of its `.msg` file, in their order:
+//!
+//! ```
+//! use ros2_node::messages::{Header, Message};
+//! use serde::{Deserialize, Serialize};
+//!
+//! /// `sensor_msgs/Temperature`.
+//! #[derive(Debug, Clone, Serialize, Deserialize)]
+//! struct Temperature {
+//!     header: Header,
+//!     temperature: f64,
+//!     variance: f64,
+//! }
+//!
+//! impl Message for Temperature {
+//!     const PACKAGE: &'static str = "sensor_msgs";
+//!     const NAME: &'static str = "Temperature";
+//! }
+//! ```
+
+use serde::{Deserialize, Serialize};
+
+mod lifecycle;
+mod parameters;
+mod standard;
+
+pub use lifecycle::*;
+pub use parameters::*;
+pub use standard::*;
+
+/// A message type's place in the ROS type system: `package/msg/name`.
+pub trait Message: Serialize + for<'de> Deserialize<'de> + 'static {
+    /// ROS package that defines the message.
+    const PACKAGE: &'static str;
+    /// Name of the message in its package.
+    const NAME: &'static str;
+}
+
+macro_rules! ros_message {
+    ($($package:literal / $name:ident),+ $(,)?) => {$(
+        impl Message for $name {
+            const PACKAGE: &'static str = $package;
+            const NAME: &'static str = stringify!($name);
+        }
+    )+};
+}
+
+ros_message!(
+    "lifecycle_msgs" / TransitionEvent,
+    "rcl_interfaces" / ParameterEvent,
+    "rosgraph_msgs" / Clock,
+    "std_msgs" / Header,
+);
