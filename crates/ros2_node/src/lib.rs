@@ -5,7 +5,10 @@
 //! descriptions and ranges behind their services, `qos_overrides`, a managed node's lifecycle, `/clock`, `/rosout`, and
 //! leaving so that others notice.
 //!
+//! [`node::Node`] puts these parts together; its module shows how.
+//!
 //! ```text
+//! node                               all of it together
 //! arguments, rules                   the command line, and the grammar of one value in it
 //! environment, distribution          what variables ask for; which ROS 2 the build talks with
 //! names                              the node's and its topics' names after remaps
@@ -57,6 +60,8 @@ pub mod messages;
 pub mod names;
 #[cfg(feature = "client")]
 pub mod newest;
+#[cfg(feature = "client")]
+pub mod node;
 #[cfg(feature = "client")]
 pub mod once;
 #[cfg(feature = "client")]
