@@ -15,20 +15,23 @@ impl ResetService {
     /// # Errors
     /// [`EndpointError`] when the middleware refuses.
     pub fn open(ros: &mut RosNode) -> Result<(Self, Receiver<()>), EndpointError> {
-        let name = format!("{}/reset", ros.names().fully_qualified());
-        let service = Service::open(ros, &name, ("std_srvs", "Trigger"))?;
         let (requests, resets) = bounded(1);
-        let serve = service.serve(move |_: TriggerRequest| {
-            // Before the answer: a frame sent after it finds the request waiting, and resets come before
-            // frames. A full channel holds a request that will do.
-            let _ = requests.try_send(());
-            std::future::ready(TriggerResponse {
-                success: true,
-                message:
-                    "the track and the last attitude are forgotten: the next frame is the first"
-                        .to_owned(),
-            })
-        });
+        let serve = Service::of_node(
+            ros,
+            "reset",
+            ("std_srvs", "Trigger"),
+            move |_: TriggerRequest| {
+                // Before the answer: a frame sent after it finds the request waiting, and resets come before
+                // frames. A full channel holds a request that will do.
+                let _ = requests.try_send(());
+                std::future::ready(TriggerResponse {
+                    success: true,
+                    message:
+                        "the track and the last attitude are forgotten: the next frame is the first"
+                            .to_owned(),
+                })
+            },
+        )?;
         Ok((Self(smol::spawn(serve)), resets))
     }
 

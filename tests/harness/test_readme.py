@@ -23,7 +23,12 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_every_link_of_the_documents_leads_to_a_file_and_a_heading() -> None:
-    pages = [*REPOSITORY.glob("*.md"), *REPOSITORY.glob("docs/**/*.md"), REPOSITORY / "tests" / "README.md"]
+    pages = [
+        *REPOSITORY.glob("*.md"),
+        *REPOSITORY.glob("docs/**/*.md"),
+        *REPOSITORY.glob("crates/*/README.md"),
+        REPOSITORY / "tests" / "README.md",
+    ]
     dead = []
     for page in pages:
         for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):

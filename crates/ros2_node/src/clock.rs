@@ -84,7 +84,7 @@ impl NodeClock {
         self.lock().as_mut().and_then(|s| s.jump.take())
     }
 
-    /// Returns since when simulated time is wanted and none has come; none while time is the system's.
+    /// Returns since when simulated time is wanted and none has come; `None` while time is the system's.
     #[must_use]
     pub fn silence(&self) -> Option<ClockSilence> {
         self.lock().as_ref().map(|simulated| ClockSilence {

@@ -18,7 +18,7 @@ pub enum DiscoveryRange {
 }
 
 impl DiscoveryRange {
-    /// Returns the only addresses that may be used; none where all may.
+    /// Returns the only addresses that may be used; `None` where all may.
     #[must_use]
     pub const fn only_address(self) -> Option<Ipv4Addr> {
         match self {

@@ -1,4 +1,4 @@
-//! The other ends of the node's topics: who is there, and why nothing passes to or from whom.
+//! The other ends of the node's topics: which there are, and why nothing passes to or from some of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -10,7 +10,7 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use super::environment::{DiscoveryRange, Environment};
 use super::rtps::{self, Data, GuidBytes, Packet};
 
-/// How many participants of this host are told by unicast.
+/// How many participants of this host get it by unicast.
 const LOCAL_PARTICIPANTS: u16 = 120;
 /// The group on which participants announce themselves (RTPS 2.3, 9.6.1.4.1).
 const DISCOVERY_GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);

@@ -19,7 +19,8 @@ use crate::text;
 /// Other crates' lines from warnings on, but the middleware's from errors on: it warns of every packet and every
 /// string that is not as it should be. Not even its errors about the order of samples: while the system's clock is
 /// behind there is one for every look at an input, and [`super::system_clock`] says it. What the client library says of
-/// `ROS_DISTRO` is an error to it even where both distributions speak alike; [`super::distribution`] tells the two apart.
+/// `ROS_DISTRO` is an error to it even where both distributions speak alike; [`super::distribution`] tells the two
+/// apart.
 const DEFAULT_FILTER: &str = "warn,rustdds=error,rustdds::structure::dds_cache=off,\
     ros2_client=error,ros2_client::distributions=off,cdr_encoding=error";
 /// This crate's own lines are said by the node, too.

@@ -244,7 +244,8 @@ impl Node {
         }
     }
 
-    /// Opens the services of parameters and lifecycle. After the topics: who finds the services finds the topics too.
+    /// Opens the services of parameters and lifecycle. Call it after opening the topics: a client that finds the
+    /// services then finds the topics too.
     ///
     /// # Errors
     /// [`EndpointError`] when the middleware refuses.

@@ -1,7 +1,7 @@
 //! Parameter files as ROS writes them, each value with its line.
 //!
-//! Only what is meant for a node is checked, by who asks for it: sections of other nodes may hold anything that is
-//! YAML.
+//! Only what is meant for a node is checked, when that node asks for it: sections of other nodes may hold anything that
+//! is YAML.
 //!
 //! ```yaml
 //! /**:                     # a pattern of node names, or one name
@@ -34,7 +34,7 @@ pub struct Section {
 pub struct FileParameter {
     /// Name, nested keys joined by dots.
     pub name: String,
-    /// Value; none where the file has a list, an empty map, an alias or nothing.
+    /// Value; `None` where the file has a list, an empty map, an alias or nothing.
     pub value: Option<ParameterValue>,
     /// Line in the file, from 1.
     pub line: u64,
@@ -146,7 +146,7 @@ impl Section {
     }
 }
 
-/// Returns the value of one word of YAML, as `-p` has it; none where it is a list or nothing.
+/// Returns the value of one word of YAML, as `-p` has it; `None` where it is a list or nothing.
 ///
 /// # Errors
 /// The reason why it is no YAML, or that it is a map.
@@ -296,7 +296,7 @@ impl<'text> Reader<'text> {
         }
     }
 
-    /// Returns the only document; none of an empty text.
+    /// Returns the only document; `None` for an empty text.
     fn document(&mut self) -> Result<Option<Tree>, Fault> {
         let mut found = None;
         loop {
@@ -366,7 +366,7 @@ impl From<&ScanError> for Fault {
     }
 }
 
-/// Returns what a word means; none for nothing at all.
+/// Returns what a word means; `None` for nothing at all.
 fn meaning(word: &str, style: ScalarStyle, tag: Option<&Tag>) -> Option<ParameterValue> {
     // rcl minds quotes and the full tag, and not whether a word stands in a block.
     let is_quoted = matches!(style, ScalarStyle::SingleQuoted | ScalarStyle::DoubleQuoted);

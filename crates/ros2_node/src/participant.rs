@@ -62,7 +62,7 @@ pub const fn reliable(depth: usize) -> QosProfile {
         .history(History::KeepLast { depth })
 }
 
-/// Returns what the future gives, or none if that takes longer than `patience`.
+/// Returns what the future gives, or `None` if that takes longer than `patience`.
 pub async fn within<T>(patience: Duration, future: impl Future<Output = T>) -> Option<T> {
     pin_mut!(future);
     match select(future, smol::Timer::after(patience)).await {

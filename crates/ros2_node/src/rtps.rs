@@ -35,7 +35,7 @@ pub struct Data<'a> {
     pub sequence_number: i64,
     /// Parameter ids and values; lengths are multiples of four.
     pub inline_qos: &'a [(u16, &'a [u8])],
-    /// Serialized, with its encapsulation header; none for a dispose.
+    /// Serialized, with its encapsulation header; `None` for a dispose.
     pub payload: Option<&'a [u8]>,
 }
 

@@ -13,7 +13,7 @@ use crate::text::clip;
 /// `-p node:name:=value`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
-    /// Base name of the node; none: every node.
+    /// Base name of the node; `None`: every node.
     pub node: Option<String>,
     /// The parameter.
     pub name: String,

@@ -21,7 +21,7 @@ pub type ParticipantId = [u8; 12];
 pub struct RunningNode {
     /// The process.
     pub participant: ParticipantId,
-    /// Absolute name of the node; none until its services are known, or when several nodes share the process.
+    /// Absolute name of the node; `None` until its services are known, or when several nodes share the process.
     pub name: Option<String>,
     /// Absolute name of the topic of that type.
     pub known_by: String,

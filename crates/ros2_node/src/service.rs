@@ -12,7 +12,8 @@
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use futures::{StreamExt, pin_mut};
+use futures::future::BoxFuture;
+use futures::{FutureExt, StreamExt, pin_mut};
 use ros2_client::dds::rustdds::bytes::Bytes;
 use ros2_client::dds::rustdds::dds::WriteError;
 use ros2_client::dds::rustdds::discovery::{DiscoveredReaderData, ReaderProxy};
@@ -103,6 +104,25 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
             },
             bad_requests: SaidOnce::default(),
         })
+    }
+
+    /// Returns the work of a service `name` below the node's own name: it answers until it is dropped.
+    ///
+    /// # Errors
+    /// [`EndpointError::Create`] when the middleware refuses.
+    pub fn of_node<Response, Answer>(
+        ros: &mut RosNode,
+        name: &str,
+        service_type: (&str, &str),
+        answer: impl FnMut(Request) -> Answer + Send + 'static,
+    ) -> Result<BoxFuture<'static, ()>, EndpointError>
+    where
+        Request: Send + Sync,
+        Response: Serialize + Default + Send + Sync + 'static,
+        Answer: Future<Output = Response> + Send + 'static,
+    {
+        let name = format!("{}/{name}", ros.names().fully_qualified());
+        Ok(Self::open(ros, &name, service_type)?.serve(answer).boxed())
     }
 
     /// Answers every request, one after the other, for ever.
@@ -216,7 +236,7 @@ impl Replies {
         Ok(())
     }
 
-    /// Returns the readers that the client's participant has on the topic, none after a while in vain. Those
+    /// Returns the readers that the client's participant has on the topic, or none after a while. Those
     /// that did not ask know by the identity that a reply is not for them.
     async fn readers_of(&self, request: RmwRequestId) -> Vec<ReaderProxy> {
         let client = request.writer_gid.to_bytes16();

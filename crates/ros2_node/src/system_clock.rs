@@ -44,7 +44,7 @@ impl SystemClock {
     }
 }
 
-/// Returns the system's time and a steady one, read at once: none if something came between.
+/// Returns the system's time and a steady one, read at once; `None` if something came between.
 #[must_use]
 pub fn both_clocks() -> Option<(SystemTime, Instant)> {
     let before = Instant::now();

@@ -115,7 +115,7 @@ impl Lifecycle {
             ..services::event(transition)
         };
         if let Err(error) = self.events.publish(event) {
-            log::warn!("a change of state is not told on ~/transition_event: {error}");
+            log::warn!("a change of state is not published on ~/transition_event: {error}");
         }
     }
 

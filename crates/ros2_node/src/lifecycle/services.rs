@@ -1,9 +1,7 @@
 //! The five services of a managed node.
 
-use futures::future::{BoxFuture, join_all, ready};
+use futures::future::{join_all, ready};
 use futures::{FutureExt, TryFutureExt};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use super::states::{GRAPH, State, Transition};
 use super::{Request, SharedState};
@@ -25,52 +23,38 @@ pub(super) fn open(
     let shared = || state.clone();
     let (current, available) = (shared(), shared());
     let services = [
-        service(ros, "get_state", "GetState", move |_: EmptyRequest| {
-            ready(state_message(current.get()))
-        })?,
-        service(
+        Service::of_node(
+            ros,
+            "get_state",
+            (PACKAGE, "GetState"),
+            move |_: EmptyRequest| ready(state_message(current.get())),
+        )?,
+        Service::of_node(
             ros,
             "get_available_states",
-            "GetAvailableStates",
+            (PACKAGE, "GetAvailableStates"),
             |_: EmptyRequest| ready(State::ALL.map(state_message).to_vec()),
         )?,
-        service(
+        Service::of_node(
             ros,
             "get_available_transitions",
-            "GetAvailableTransitions",
+            (PACKAGE, "GetAvailableTransitions"),
             move |_: EmptyRequest| ready(descriptions(available.get().transitions())),
         )?,
-        service(
+        Service::of_node(
             ros,
             "get_transition_graph",
-            "GetAvailableTransitions",
+            (PACKAGE, "GetAvailableTransitions"),
             |_: EmptyRequest| ready(descriptions(GRAPH.iter())),
         )?,
-        service(
+        Service::of_node(
             ros,
             "change_state",
-            "ChangeState",
+            (PACKAGE, "ChangeState"),
             move |request: ChangeStateRequest| ask(requests.clone(), request.transition),
         )?,
     ];
     Ok(smol::spawn(join_all(services).map(drop)))
-}
-
-/// Returns the work of one service of the node.
-fn service<Request, Response, Answer>(
-    ros: &mut RosNode,
-    name: &str,
-    service_type: &str,
-    answer: impl FnMut(Request) -> Answer + Send + 'static,
-) -> Result<BoxFuture<'static, ()>, EndpointError>
-where
-    Request: DeserializeOwned + Send + Sync + 'static,
-    Response: Serialize + Default + Send + Sync + 'static,
-    Answer: Future<Output = Response> + Send + 'static,
-{
-    let name = format!("{}/{name}", ros.names().fully_qualified());
-    let service = Service::open(ros, &name, (PACKAGE, service_type))?;
-    Ok(service.serve(answer).boxed())
 }
 
 /// Asks the node for a transition, and returns what came of it.

@@ -89,7 +89,7 @@ impl State {
         })
     }
 
-    /// Returns where the work of this state leads to; none for a state that has no work.
+    /// Returns where the work of this state leads to; `None` for a state that has no work.
     #[must_use]
     pub fn after(self, result: WorkResult) -> Option<&'static Transition> {
         let label = match result {

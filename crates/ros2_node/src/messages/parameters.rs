@@ -143,7 +143,7 @@ pub struct Assignments {
 /// Request of `ListParameters`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ListRequest {
-    /// Names, or beginnings of names up to a dot; none: all.
+    /// Names, or beginnings of names up to a dot; empty: all.
     pub prefixes: Vec<String>,
     /// How many parts of a name may follow the prefix; 0: any number.
     pub depth: u64,

@@ -5,11 +5,9 @@
 
 use std::sync::Arc;
 
+use futures::FutureExt;
 use futures::future::{join_all, ready};
-use futures::{FutureExt, future::BoxFuture};
 use ros2_client::Publisher;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 
 use super::SharedParameters;
 use crate::clock::NodeClock;
@@ -46,44 +44,46 @@ impl ParameterServices {
         let (set, set_all, set_events, set_all_events) =
             (shared(), shared(), Arc::clone(&events), events);
         let services = [
-            service(
+            Service::of_node(
                 ros,
                 "list_parameters",
-                "ListParameters",
-                move |request: ListRequest| list.list(&request),
+                (PACKAGE, "ListParameters"),
+                move |request: ListRequest| ready(list.list(&request)),
             )?,
-            service(
+            Service::of_node(
                 ros,
                 "get_parameters",
-                "GetParameters",
-                move |Names { names }| get.get(&names),
+                (PACKAGE, "GetParameters"),
+                move |Names { names }| ready(get.get(&names)),
             )?,
-            service(
+            Service::of_node(
                 ros,
                 "get_parameter_types",
-                "GetParameterTypes",
-                move |Names { names }| types.types(&names),
+                (PACKAGE, "GetParameterTypes"),
+                move |Names { names }| ready(types.types(&names)),
             )?,
-            service(
+            Service::of_node(
                 ros,
                 "describe_parameters",
-                "DescribeParameters",
-                move |Names { names }| describe.describe(&names),
+                (PACKAGE, "DescribeParameters"),
+                move |Names { names }| ready(describe.describe(&names)),
             )?,
-            service(
+            Service::of_node(
                 ros,
                 "set_parameters",
-                "SetParameters",
+                (PACKAGE, "SetParameters"),
                 move |request: Assignments| {
                     let set_one = |one| set_events.after(set.set(std::slice::from_ref(one)));
-                    request.parameters.iter().map(set_one).collect::<Vec<_>>()
+                    ready(request.parameters.iter().map(set_one).collect::<Vec<_>>())
                 },
             )?,
-            service(
+            Service::of_node(
                 ros,
                 "set_parameters_atomically",
-                "SetParametersAtomically",
-                move |request: Assignments| set_all_events.after(set_all.set(&request.parameters)),
+                (PACKAGE, "SetParametersAtomically"),
+                move |request: Assignments| {
+                    ready(set_all_events.after(set_all.set(&request.parameters)))
+                },
             )?,
         ];
         Ok(Self(smol::spawn(join_all(services).map(drop))))
@@ -93,22 +93,6 @@ impl ParameterServices {
     pub fn close(self) {
         smol::block_on(self.0.cancel());
     }
-}
-
-/// Returns the work of one service of the node.
-fn service<Request, Response>(
-    ros: &mut RosNode,
-    name: &str,
-    service_type: &str,
-    mut answer: impl FnMut(Request) -> Response + Send + 'static,
-) -> Result<BoxFuture<'static, ()>, EndpointError>
-where
-    Request: DeserializeOwned + Send + Sync + 'static,
-    Response: Serialize + Default + Send + Sync + 'static,
-{
-    let name = format!("{}/{name}", ros.names().fully_qualified());
-    let service = Service::open(ros, &name, (PACKAGE, service_type))?;
-    Ok(service.serve(move |request| ready(answer(request))).boxed())
 }
 
 /// Where others hear of changes.
@@ -136,7 +120,7 @@ impl Events {
                 ..ParameterEvent::default()
             };
             if let Err(error) = self.publisher.publish(event) {
-                log::warn!("a change of parameters is not told on /parameter_events: {error}");
+                log::warn!("a change of parameters is not published on /parameter_events: {error}");
             }
         }
         SetParametersResult {

@@ -118,7 +118,7 @@ impl SharedParameters {
         names.iter().map(describe).collect()
     }
 
-    /// Sets all of the parameters, or none. Returns what those that can change are now, for the others to hear.
+    /// Sets all of the parameters, or none. Returns what those that can change are now, for `/parameter_events`.
     ///
     /// # Errors
     /// The result that names the first parameter that cannot have its value, and why, or those that do not go

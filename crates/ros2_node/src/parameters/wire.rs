@@ -28,7 +28,7 @@ pub fn parameter_message(name: &str, value: &ParameterValue) -> WireParameter {
     }
 }
 
-/// Returns the value in a message; none where it holds nothing, or a list.
+/// Returns the value in a message; `None` where it holds nothing, or a list.
 pub fn plain_value(message: &WireValue) -> Option<ParameterValue> {
     match message.kind {
         parameter_type::BOOL => Some(ParameterValue::Bool(message.bool_value)),
