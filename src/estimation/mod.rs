@@ -40,7 +40,6 @@ use crate::geometry::PoseCovariance;
 
 pub use budget::{
     BudgetError, CalibrationMode, Cause, CauseKind, ErrorBudget, FlexMode, FrameCauses,
-    MAX_FLEX_MODES,
 };
 pub use estimator::Estimator;
 pub(crate) use estimator::PRIOR_SIGMA;

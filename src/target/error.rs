@@ -107,4 +107,51 @@ pub enum MarkerMapError {
         id: u32,
         family: String,
     },
+    /// A standard deviation that is none, or in another unit.
+    #[error("{place}: {of} must be 0 to {most_m} m, got {value_m}")]
+    Sigma {
+        place: Place,
+        of: String,
+        value_m: f64,
+        most_m: f64,
+    },
+    /// A time in which no airframe bends.
+    #[error(
+        "{place}: time_constant_s of flex mode `{name}` must be {least_s} to {most_s} s, got {value_s}; leave it out for a shape that lasts for the whole flight"
+    )]
+    TimeConstant {
+        place: Place,
+        name: String,
+        value_s: f64,
+        least_s: f64,
+        most_s: f64,
+    },
+    /// A shape of a marker that is not on the map.
+    #[error(
+        "{place}: the shape of flex mode `{name}` must name a marker (`id`) or a tag (`tag`) of the map"
+    )]
+    FlexMarker { place: Place, name: String },
+    /// One marker twice in a shape.
+    #[error("{place}: flex mode `{name}` moves marker {id} twice")]
+    FlexMarkerTwice { place: Place, name: String, id: u32 },
+    /// A displacement that is no number, or in metres rather than in amplitudes.
+    #[error(
+        "{place}: a displacement of flex mode `{name}` must be at most {most} times its amplitude, got {length}"
+    )]
+    FlexShape {
+        place: Place,
+        name: String,
+        length: f64,
+        most: f64,
+    },
+    /// One name for two modes.
+    #[error("{place}: flex mode `{name}` stands twice")]
+    DuplicateFlex { place: Place, name: String },
+    /// More modes than the estimator has room for.
+    #[error("{place}: a map may have at most {most} flex modes, got {got}")]
+    TooManyFlexModes {
+        place: Place,
+        got: usize,
+        most: usize,
+    },
 }

@@ -4,6 +4,7 @@ use nalgebra::Point3;
 use serde::Deserialize;
 use serde_saphyr::{Location, Spanned};
 
+use super::budget::{self, RawFlex};
 use super::check::{Part, check};
 use super::tag_file::{self, RawTag};
 use super::{Marker, MarkerMap, MarkerMapError, Tag};
@@ -17,6 +18,10 @@ struct RawMap {
     markers: Spanned<Vec<RawMarker>>,
     #[serde(default)]
     tags: Vec<RawTag>,
+    /// Of all markers and tags without their own, m.
+    sigma: Option<Spanned<f64>>,
+    #[serde(default)]
+    flex: Vec<RawFlex>,
 }
 
 fn nothing() -> Spanned<Vec<RawMarker>> {
@@ -31,6 +36,7 @@ struct RawMarker {
     x: Spanned<f64>,
     y: Spanned<f64>,
     z: Spanned<f64>,
+    sigma: Option<Spanned<f64>>,
 }
 
 pub(super) fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
@@ -71,7 +77,25 @@ pub(super) fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError
         };
         Place::at(source, location)
     })?;
-    Ok(MarkerMap::sorted(&raw.name, markers, tags))
+    let of_markers: Vec<_> = markers
+        .iter()
+        .zip(entries)
+        .map(|(marker, entry)| (marker.id, entry.sigma.as_ref()))
+        .collect();
+    let of_tags: Vec<_> = tags
+        .iter()
+        .zip(&raw.tags)
+        .map(|(tag, entry)| (tag, entry.sigma.as_ref()))
+        .collect();
+    let budget = budget::budget(
+        raw.sigma.as_ref(),
+        &of_markers,
+        &of_tags,
+        &raw.flex,
+        &markers,
+        source,
+    )?;
+    Ok(MarkerMap::sorted(&raw.name, markers, tags, budget))
 }
 
 impl RawMarker {

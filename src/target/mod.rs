@@ -7,6 +7,7 @@
 //! Which of the markers a frame shows is `estimation`'s business: a map that passes here can still
 //! lose its pose in a frame that shows only three of them, and those in line.
 
+mod budget;
 mod check;
 mod error;
 mod file;
@@ -15,6 +16,7 @@ mod tag_file;
 
 use nalgebra::Point3;
 
+pub use budget::{Flex, MapBudget};
 pub use error::MarkerMapError;
 pub use tag::Tag;
 
@@ -46,7 +48,11 @@ pub struct MarkerMap {
     markers: Vec<Marker>,
     /// Ascending id.
     tags: Vec<Tag>,
+    budget: MapBudget,
 }
+
+/// Most ways in which an airframe bends.
+pub const MAX_FLEX_MODES: usize = 4;
 
 /// Name and text of each map that comes with the program.
 const SHIPPED: [(&str, &str); 2] = [
@@ -62,7 +68,12 @@ impl MarkerMap {
     pub fn new(name: &str, markers: &[Marker]) -> Result<Self, MarkerMapError> {
         let whole = Place::whole(&format!("marker map `{name}`"));
         check::check(markers, |_| whole.clone())?;
-        Ok(Self::sorted(name, markers.to_vec(), Vec::new()))
+        Ok(Self::sorted(
+            name,
+            markers.to_vec(),
+            Vec::new(),
+            MapBudget::default(),
+        ))
     }
 
     /// Returns the checked map from YAML text.
@@ -116,6 +127,12 @@ impl MarkerMap {
         &self.markers
     }
 
+    /// Returns what the map and the airframe may have wrong.
+    #[must_use]
+    pub fn budget(&self) -> &MapBudget {
+        &self.budget
+    }
+
     /// Returns where a marker sits, tanker frame, m; none for an id that the map does not hold.
     #[must_use]
     pub fn get(&self, id: u32) -> Option<Point3<f64>> {
@@ -140,13 +157,14 @@ impl MarkerMap {
         if is_corner { None } else { self.get(id) }
     }
 
-    fn sorted(name: &str, mut markers: Vec<Marker>, mut tags: Vec<Tag>) -> Self {
+    fn sorted(name: &str, mut markers: Vec<Marker>, mut tags: Vec<Tag>, budget: MapBudget) -> Self {
         markers.sort_unstable_by_key(|marker| marker.id);
         tags.sort_unstable_by_key(|tag| tag.id);
         Self {
             name: name.to_owned(),
             markers,
             tags,
+            budget,
         }
     }
 }

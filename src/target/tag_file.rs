@@ -33,6 +33,7 @@ pub(super) struct RawTag {
     qy: Option<Spanned<f64>>,
     qz: Option<Spanned<f64>>,
     qw: Option<Spanned<f64>>,
+    pub(super) sigma: Option<Spanned<f64>>,
 }
 
 /// Returns the tags in the order of the text.

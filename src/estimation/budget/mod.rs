@@ -23,14 +23,13 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::camera::{CALIBRATION_SIZE, CalibrationChange};
+use crate::target::MAX_FLEX_MODES;
 
 pub(super) use causes::frame_causes;
 pub use causes::{Cause, CauseKind, FrameCauses};
 pub(super) use frame::{AttitudePrior, FrameBudget};
 pub(super) use in_doubt::InDoubt;
 
-/// Most ways in which the airframe bends.
-pub const MAX_FLEX_MODES: usize = 4;
 /// Most modes of calibration and jitter together.
 const MAX_IMAGE_MODES: usize = 12;
 /// Most modes of all kinds.
