@@ -210,6 +210,7 @@ mod tests {
             left_out: LeftOut::default(),
             initialisation: None,
             track: FrameTrack::default(),
+            causes: None,
         };
         let detections = [
             detection(1, 58.5, -51.3),

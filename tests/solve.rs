@@ -317,3 +317,71 @@ fn a_wrong_point_is_left_out_and_named() {
     let answer = &solve(&["--max-outliers", "0"], vec![line])[0];
     assert_eq!(answer["outcome"], "not_trusted", "{answer}");
 }
+
+/// A map with a budget: wider covariance, the modes' amplitudes, and what dominates.
+#[test]
+fn a_budget_widens_the_covariance_and_names_what_dominates() {
+    let map = "name: kite
+sigma: 0.02
+markers:
+  - {id: 1, x: 3.7, y: -7.13, z: 0.7}
+  - {id: 2, x: 3.7, y: 7.13, z: 0.7}
+  - {id: 3, x: 7.79, y: -2.689, z: 0.7}
+  - {id: 4, x: 7.79, y: 2.689, z: 0.7}
+  - {id: 5, x: 7.96, y: 0.0, z: 3.189}
+  - {id: 6, x: 0.0, y: 0.0, z: 0.0}
+flex:
+  - name: wing_bending
+    sigma: 0.3
+    shape: [{id: 1, z: 1}, {id: 2, z: 1}, {id: 3, z: 0.142}, {id: 4, z: 0.142}]
+";
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("budget_kite.yaml");
+    std::fs::write(&path, map).expect("a file");
+    let scene = tanker_pose::simulation::paper_scene();
+    let points: Vec<Value> = scene
+        .exact_observations()
+        .iter()
+        .map(|seen| json!({"id": seen.id, "u": seen.pixel.u, "v": seen.pixel.v}))
+        .collect();
+    let line = json!({"id": 1, "camera": camera(), "points": points}).to_string();
+    let path = path.to_str().expect("a plain path");
+    let exact = solve(&["--marker-map", "paper"], vec![line.clone()]);
+    let with_budget = solve(
+        &[
+            "--marker-map",
+            path,
+            "--focal-length-sigma",
+            "0.003",
+            "--principal-point-sigma-px",
+            "3",
+            "--k1-sigma",
+            "0.02",
+            "--jitter-px",
+            "0.5",
+        ],
+        vec![line],
+    );
+    let variance = |answer: &Value| answer["covariance"][0].as_f64().expect("a pose");
+    assert!(variance(&with_budget[0]) > 10.0 * variance(&exact[0]));
+    assert!(exact[0].get("modes").is_none());
+    let modes = with_budget[0]["modes"].as_object().expect("modes");
+    let names: Vec<&str> = modes.keys().map(String::as_str).collect();
+    let expected = [
+        "distortion_0",
+        "focal_length",
+        "jitter_u",
+        "jitter_v",
+        "principal_point_u",
+        "principal_point_v",
+        "wing_bending",
+    ];
+    assert_eq!(names, expected);
+    // Exact pixels: nothing was bent.
+    assert!(
+        modes
+            .values()
+            .all(|value| value.as_f64().is_some_and(|a| a.abs() < 1e-6))
+    );
+    let dominant = with_budget[0]["dominant_cause"].as_str().expect("a name");
+    assert!(dominant.starts_with("principal_point"), "{dominant}");
+}

@@ -68,6 +68,7 @@ impl From<&Parameters> for Configuration {
     fn from(parameters: &Parameters) -> Self {
         Self {
             settings: Settings {
+                calibration: crate::config::CalibrationSigmas::default(),
                 estimator: estimator_settings(parameters),
                 pixel_sigma_px: parameters.double("pixel_sigma_px"),
                 edge_margin_px: parameters.double("edge_margin_px"),

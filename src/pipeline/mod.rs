@@ -8,6 +8,7 @@
 //! clock, a file or a topic. What is missing is never replaced by a default, and every frame has an
 //! outcome: a pose, or the one reason for none.
 
+mod budget;
 mod checks;
 mod code;
 mod edge;
@@ -27,6 +28,7 @@ use crate::config::Settings;
 use crate::estimation::{EstimateError, Estimator, Initialisation, Observation};
 use crate::target::MarkerMap;
 
+pub use budget::error_budget;
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use edge::{ImageEdges, LeftOut};
@@ -107,7 +109,7 @@ impl Pipeline {
     #[must_use]
     pub fn new(settings: Settings, map: Arc<MarkerMap>) -> Self {
         Self {
-            estimator: Estimator::new(settings.estimator.clone()),
+            estimator: estimator(&settings, &map),
             tracker: Tracker::new(settings.track),
             predictor: Predictor::default(),
             settings,
@@ -119,8 +121,10 @@ impl Pipeline {
 
     /// Replaces the settings from the next frame on; camera, last attitude and track stay.
     pub fn set_settings(&mut self, settings: Settings) {
-        if settings.estimator != *self.estimator.settings() {
-            self.estimator = Estimator::new(settings.estimator.clone());
+        let is_other = settings.estimator != self.settings.estimator
+            || settings.calibration != self.settings.calibration;
+        if is_other {
+            self.estimator = estimator(&settings, &self.map);
         }
         if settings.rectified != self.settings.rectified {
             // The rectified camera looks elsewhere.
@@ -254,6 +258,11 @@ impl Pipeline {
     }
 }
 
+fn estimator(settings: &Settings, map: &MarkerMap) -> Estimator {
+    Estimator::new(settings.estimator.clone())
+        .with_budget(error_budget(map.budget(), &settings.calibration))
+}
+
 /// Returns the outcome of checked observations: the estimate, judged.
 #[must_use]
 pub fn solve(
@@ -264,7 +273,16 @@ pub fn solve(
 ) -> FrameOutcome {
     let asked = estimator.settings().initialisation;
     match estimator.estimate(camera, observations, previous) {
-        Ok(solution) => FrameOutcome::judged(solution, observations, estimator.settings()),
+        Ok(solution) => {
+            let has_causes =
+                estimator.budget().is_some() || estimator.settings().attitude_sigma_rad.is_some();
+            let causes = has_causes
+                .then(|| estimator.causes(camera, observations, &solution))
+                .flatten();
+            let mut outcome = FrameOutcome::judged(solution, observations, estimator.settings());
+            outcome.causes = causes;
+            outcome
+        }
         Err(error) => {
             let attempted = !matches!(
                 error,

@@ -1,7 +1,9 @@
 //! What becomes of a frame: a trusted pose, or the one reason for none.
 
 use crate::camera::CameraError;
-use crate::estimation::{EstimateError, EstimatorSettings, Initialisation, Observation, Solution};
+use crate::estimation::{
+    EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, Solution,
+};
 
 use super::{FrameTrack, LeftOut, Stamp};
 use crate::text::{clip, digits, list, quoted};
@@ -229,6 +231,8 @@ pub struct FrameOutcome {
     pub initialisation: Option<Initialisation>,
     /// What the frame did to the track, if there is one.
     pub track: FrameTrack,
+    /// What each cause of the error budget did in this frame; none without a budget or a solution.
+    pub causes: Option<FrameCauses>,
 }
 
 impl FrameOutcome {
@@ -243,6 +247,7 @@ impl FrameOutcome {
             left_out: LeftOut::default(),
             initialisation: None,
             track: FrameTrack::default(),
+            causes: None,
         }
     }
 
@@ -268,6 +273,7 @@ impl FrameOutcome {
             left_out: LeftOut::default(),
             initialisation,
             track: FrameTrack::default(),
+            causes: None,
         }
     }
 

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use nalgebra::Rotation3;
 use tanker_pose::camera::{CameraFileError, CameraInfo};
-use tanker_pose::config::nominal_camera_from_tanker;
-use tanker_pose::estimation::{EstimatorSettings, Initialisation, Refinement};
+use tanker_pose::config::{CalibrationSigmas, nominal_camera_from_tanker};
+use tanker_pose::estimation::{Estimator, EstimatorSettings, Initialisation, Refinement};
 use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
-use tanker_pose::target::MarkerMap;
+use tanker_pose::pipeline::error_budget;
+use tanker_pose::target::{MapBudget, MarkerMap};
 use tanker_pose::text_file;
 
 /// How a pose is found and judged; the same words as the node's parameters.
@@ -57,6 +58,24 @@ pub struct EstimatorOptions {
     /// Yaw, degrees; positive looks left
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
     camera_mount_yaw_deg: f64,
+    /// Standard deviation of the attitude about the nominal one, degrees; 0: nothing is known of it
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(0.0, 45.0))]
+    attitude_sigma_deg: f64,
+    /// Standard deviation of the focal length, a share: 0.003 is 0.3 %
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = between(0.0, 0.1))]
+    focal_length_sigma: f64,
+    /// Standard deviation of each coordinate of the principal point, px
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    principal_point_sigma_px: f64,
+    /// Standard deviation of the first coefficient of D
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = between(0.0, 1.0))]
+    k1_sigma: f64,
+    /// Standard deviation of the second coefficient of D
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = between(0.0, 1.0))]
+    k2_sigma: f64,
+    /// Standard deviation of a shift of the whole image that differs in each frame, px
+    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    jitter_px: f64,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -111,8 +130,22 @@ impl EstimatorOptions {
             max_outliers: usize::from(self.max_outliers),
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
-            attitude_sigma_rad: None,
+            attitude_sigma_rad: (self.attitude_sigma_deg > 0.0)
+                .then(|| self.attitude_sigma_deg.to_radians()),
         }
+    }
+
+    /// Returns the estimator with the error budget of a map and of the options.
+    pub fn estimator(&self, map: Option<&MarkerMap>) -> Estimator {
+        let exact = MapBudget::default();
+        let of_map = map.map_or(&exact, MarkerMap::budget);
+        let calibration = CalibrationSigmas {
+            focal_length: self.focal_length_sigma,
+            principal_point_px: self.principal_point_sigma_px,
+            distortion: [self.k1_sigma, self.k2_sigma, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            jitter_px: self.jitter_px,
+        };
+        Estimator::new(self.settings()).with_budget(error_budget(of_map, &calibration))
     }
 }
 

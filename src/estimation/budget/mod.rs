@@ -125,23 +125,38 @@ impl ErrorBudget {
         jitter_px: f64,
     ) -> Result<Self, BudgetError> {
         check(survey, &flex, &calibration, jitter_px)?;
-        let markers = markers(survey, &flex);
-        let image = image_modes(&calibration, jitter_px);
+        let budget = Self::of_checked(survey, flex, calibration, jitter_px);
         for (kind, most, got) in [
-            ("flex", MAX_FLEX_MODES, flex.len()),
-            ("calibration and jitter", MAX_IMAGE_MODES, image.len()),
+            ("flex", MAX_FLEX_MODES, budget.flex.len()),
+            (
+                "calibration and jitter",
+                MAX_IMAGE_MODES,
+                budget.image.len(),
+            ),
         ] {
             if got > most {
                 return Err(BudgetError::TooManyModes { kind, most, got });
             }
         }
-        Ok(Self {
+        Ok(budget)
+    }
+
+    /// Returns the budget of numbers that have been checked one by one: a map's, and parameters'.
+    pub(crate) fn of_checked(
+        survey: &[(u32, f64)],
+        flex: Vec<FlexMode>,
+        calibration: Vec<CalibrationMode>,
+        jitter_px: f64,
+    ) -> Self {
+        let markers = markers(survey, &flex);
+        let image = image_modes(&calibration, jitter_px);
+        Self {
             flex,
             calibration,
             jitter_px,
             markers,
             image,
-        })
+        }
     }
 
     /// Returns whether nothing is in doubt: then the estimate is that without a budget.

@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 
 use super::messages::{self, EstimatorStatus, Header, Time};
 use crate::camera;
-use crate::estimation::{Initialisation, Solution};
+use crate::estimation::{FrameCauses, Initialisation, Solution};
 use crate::geometry::{Motion, PoseCovariance};
 use crate::pipeline::{Detection, FrameOutcome, Stamp};
 
@@ -183,6 +183,10 @@ pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> Est
     let solution = frame.solution();
     let number = |of: fn(&Solution) -> f64| solution.map_or(f64::NAN, of);
     let count = |of: fn(&Solution) -> u16| solution.map_or(0, of);
+    let modes = || {
+        let causes = frame.causes.iter().flat_map(|causes| &causes.causes);
+        causes.filter_map(|cause| Some((cause, cause.amplitude_sigmas?)))
+    };
     EstimatorStatus {
         header,
         outcome: frame.code().number(),
@@ -197,6 +201,13 @@ pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> Est
         ambiguity: number(|solution| solution.ambiguity),
         solve_time: duration(solve_time),
         track: frame.track.code().number(),
+        mode_names: modes().map(|(cause, _)| cause.name.clone()).collect(),
+        mode_amplitudes: modes().map(|(_, amplitude)| amplitude).collect(),
+        dominant_cause: frame
+            .causes
+            .as_ref()
+            .and_then(FrameCauses::dominant)
+            .map_or_else(String::new, |cause| cause.name.clone()),
     }
 }
 

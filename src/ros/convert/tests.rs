@@ -42,6 +42,7 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
         left_out: LeftOut::default(),
         initialisation: Some(Initialisation::Dlt),
         track: FrameTrack::default(),
+        causes: None,
     }
 }
 

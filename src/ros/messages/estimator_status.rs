@@ -33,6 +33,12 @@ pub struct EstimatorStatus {
     pub solve_time: Duration,
     /// A [`TrackCode`](crate::pipeline::TrackCode) as its number.
     pub track: u8,
+    /// Modes of the error budget; empty without a budget or a solution.
+    pub mode_names: Vec<String>,
+    /// Estimated amplitude of each mode, in its sigmas.
+    pub mode_amplitudes: Vec<f64>,
+    /// The cause with the largest share of the position's variance; empty as above.
+    pub dominant_cause: String,
 }
 
 impl EstimatorStatus {

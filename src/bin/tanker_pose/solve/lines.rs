@@ -1,9 +1,11 @@
 //! The lines that `solve` reads and writes.
 
+use std::collections::BTreeMap;
+
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use tanker_pose::camera::{CameraInfo, RegionOfInterest};
-use tanker_pose::estimation::Solution;
+use tanker_pose::estimation::{Cause, FrameCauses, Solution};
 use tanker_pose::pipeline::{Detection, FrameOutcome};
 
 /// Outcome of a line that is not a frame.
@@ -81,6 +83,17 @@ pub struct OutputFrame {
     rejected_ids: Vec<u32>,
     #[serde(flatten)]
     numbers: Option<OutputNumbers>,
+    #[serde(flatten)]
+    causes: Option<OutputCauses>,
+}
+
+/// What the error budget's causes did; only with a budget.
+#[derive(Debug, Serialize)]
+pub struct OutputCauses {
+    /// Estimated amplitude of each mode, in its sigmas.
+    modes: BTreeMap<String, f64>,
+    /// The cause with the largest share of the position's variance.
+    dominant_cause: Option<String>,
 }
 
 /// Only for trusted frames: a doubtful pose is not printed.
@@ -157,6 +170,7 @@ impl OutputFrame {
             used_ids: Vec::new(),
             rejected_ids: Vec::new(),
             numbers: None,
+            causes: None,
         }
     }
 
@@ -167,8 +181,19 @@ impl OutputFrame {
             message: outcome.message(),
             pose: outcome.result.as_ref().ok().map(OutputPose::new),
             numbers: outcome.solution().map(OutputNumbers::new),
+            causes: outcome.causes.as_ref().map(OutputCauses::new),
             used_ids: outcome.used_ids,
             rejected_ids: outcome.rejected_ids,
+        }
+    }
+}
+
+impl OutputCauses {
+    fn new(causes: &FrameCauses) -> Self {
+        let amplitude = |cause: &Cause| Some((cause.name.clone(), cause.amplitude_sigmas?));
+        Self {
+            modes: causes.causes.iter().filter_map(amplitude).collect(),
+            dominant_cause: causes.dominant().map(|cause| cause.name.clone()),
         }
     }
 }

@@ -144,10 +144,11 @@ impl Solver {
             .marker_map
             .as_deref()
             .map(options::marker_map)
-            .transpose();
+            .transpose()
+            .map_err(SolveError::MarkerMap)?;
         Ok(Self {
-            estimator: Estimator::new(arguments.estimator.settings()),
-            map: map.map_err(SolveError::MarkerMap)?,
+            estimator: arguments.estimator.estimator(map.as_ref()),
+            map,
             calibration: arguments
                 .camera
                 .as_deref()

@@ -1,0 +1,113 @@
+//! What map and settings say of their own errors -> the estimator's budget.
+
+use crate::camera::{CalibrationChange, FIRST_COEFFICIENT};
+use crate::config::CalibrationSigmas;
+use crate::estimation::{CalibrationMode, ErrorBudget, FlexMode};
+use crate::target::MapBudget;
+
+/// Returns the budget of a checked map and checked settings.
+#[must_use]
+pub fn error_budget(map: &MapBudget, camera: &CalibrationSigmas) -> ErrorBudget {
+    let flex = map.flex.iter().filter(|flex| flex.sigma_m > 0.0);
+    let flex = flex.map(|flex| FlexMode {
+        name: flex.name.clone(),
+        time_constant_s: flex.time_constant_s,
+        shape: flex
+            .shape
+            .iter()
+            .map(|(id, shift)| (*id, shift * flex.sigma_m))
+            .collect(),
+    });
+    ErrorBudget::of_checked(
+        &map.survey_sigma_m,
+        flex.collect(),
+        calibration_modes(camera),
+        camera.jitter_px,
+    )
+}
+
+/// One mode for both focal lengths, for each coordinate of the principal point, and for each coefficient of D.
+fn calibration_modes(sigmas: &CalibrationSigmas) -> Vec<CalibrationMode> {
+    let mode = |name: &str, places: &[usize], sigma: f64| {
+        let mut change = CalibrationChange::zeros();
+        for &place in places {
+            change[place] = sigma;
+        }
+        (sigma > 0.0).then(|| CalibrationMode {
+            name: name.to_owned(),
+            change,
+        })
+    };
+    let coefficients = sigmas.distortion.iter().enumerate().map(|(index, &sigma)| {
+        let name = format!("distortion_{index}");
+        mode(&name, &[FIRST_COEFFICIENT + index], sigma)
+    });
+    [
+        mode("focal_length", &[0, 1], sigmas.focal_length),
+        mode("principal_point_u", &[2], sigmas.principal_point_px),
+        mode("principal_point_v", &[3], sigmas.principal_point_px),
+    ]
+    .into_iter()
+    .chain(coefficients)
+    .flatten()
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::target::MarkerMap;
+
+    const MAP: &str = "name: kite
+sigma: 0.01
+markers:
+  - {id: 1, x: 0, y: -1.5, z: 0}
+  - {id: 2, x: 0, y: 1.5, z: 0, sigma: 0}
+  - {id: 3, x: 3, y: 0, z: 0.25}
+flex:
+  - {name: wing, sigma: 0.2, time_constant_s: 3, shape: [{id: 1, z: 1}, {id: 2, z: 0.5}]}
+  - {name: off, sigma: 0, shape: [{id: 1, z: 1}]}
+";
+
+    #[test]
+    fn map_and_settings_become_one_budget() {
+        let map = MarkerMap::from_yaml(MAP, "kite.yaml").expect("a good map");
+        let sigmas = CalibrationSigmas {
+            focal_length: 0.002,
+            principal_point_px: 1.5,
+            distortion: [0.01, 0.0, 0.0, 0.0, 0.03, 0.0, 0.0, 0.0],
+            jitter_px: 0.4,
+        };
+        let budget = error_budget(map.budget(), &sigmas);
+        for (id, sigma) in [(1, 0.01), (2, 0.0), (3, 0.01)] {
+            assert!((budget.survey_sigma_m(id) - sigma).abs() < f64::EPSILON);
+        }
+        assert_eq!(budget.flex().len(), 1, "one mode has a sigma");
+        let wing = &budget.flex()[0];
+        let is = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-15, "{value}");
+        assert_eq!(wing.time_constant_s, Some(3.0));
+        is(wing.shape[1].1.z, 0.1);
+        let names: Vec<&str> = budget
+            .calibration()
+            .iter()
+            .map(|mode| mode.name.as_str())
+            .collect();
+        let expected = [
+            "focal_length",
+            "principal_point_u",
+            "principal_point_v",
+            "distortion_0",
+            "distortion_4",
+        ];
+        assert_eq!(names, expected);
+        is(budget.calibration()[0].change[1], 0.002);
+        is(budget.calibration()[4].change[8], 0.03);
+        is(budget.jitter_px(), 0.4);
+    }
+
+    #[test]
+    fn an_exact_map_and_no_sigmas_are_an_empty_budget() {
+        let exact = MapBudget::default();
+        assert!(error_budget(&exact, &CalibrationSigmas::default()).is_empty());
+    }
+}
