@@ -123,6 +123,7 @@ def test_every_frame_of_an_approach_has_honest_odometry_once_the_track_is_confir
 ) -> None:
     frames, settled = 450, 100
     pose_nees, twist_nees, twist_errors = [], [], []
+    refused = 0
     for k in range(frames):
         index = flyer.next_index()
         frame = flyer.frame(index, rng)
@@ -130,12 +131,15 @@ def test_every_frame_of_an_approach_has_honest_odometry_once_the_track_is_confir
         if k < CONFIRM_FRAMES - 1:
             assert track == "CANDIDATE"
             continue
-        # Far away a frame may be refused as ambiguous; one correct frame in ten thousand is gated.
+        # Far away a frame may be refused as ambiguous; one correct frame in ten thousand is gated, and one in a
+        # thousand fails the chi-squared test.
         assert (answer.outcome, track) in (
             ("OK", "UPDATED"),
             ("OK", "GATED"),
             ("AMBIGUOUS", "PREDICTED"),
+            ("NOT_TRUSTED", "PREDICTED"),
         )
+        refused += answer.outcome == "NOT_TRUSTED"
         assert message is not None
         assert message.header == frame.header
         assert message.child_frame_id == "tanker"
@@ -150,6 +154,8 @@ def test_every_frame_of_an_approach_has_honest_odometry_once_the_track_is_confir
             pose_nees.append(nees(truth, pose_of(message.pose.pose), pose_covariance))
             covariance = np.array(message.twist.covariance).reshape(6, 6)
             twist_nees.append(float(error @ np.linalg.solve(covariance, error)))
+    # Of 450 frames 0.45 are expected; five or more come once in five thousand runs.
+    assert refused < 5
     # Every frame once.
     assert len({key(m.header.stamp) for m in flyer.odometry}) == len(flyer.odometry)
     assert len(flyer.odometry) == frames - CONFIRM_FRAMES + 1
