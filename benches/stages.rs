@@ -10,10 +10,10 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tanker_pose::camera::{Camera, CameraInfo, Pixel, Ray};
+use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo, Pixel, Ray};
 use tanker_pose::estimation::{
-    Estimator, EstimatorSettings, Initialisation, Observation, Refinement, fixed_point,
-    iterate_accelerated, iterate_literally,
+    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Initialisation,
+    Observation, Refinement, fixed_point, iterate_accelerated, iterate_literally,
 };
 use tanker_pose::geometry::optical_from_body;
 use tanker_pose::refuelling::Region;
@@ -104,6 +104,52 @@ fn estimates(criterion: &mut Criterion) {
     group.bench_function(BenchmarkId::new("prior_plumb_bob", 6), |bencher| {
         bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
     });
+}
+
+/// The same frames with every cause of an error budget.
+fn with_budget(criterion: &mut Criterion) {
+    let mode = |name: &str, places: &[usize], sigma: f64| {
+        let mut change = CalibrationChange::zeros();
+        for &place in places {
+            change[place] = sigma;
+        }
+        CalibrationMode {
+            name: name.to_owned(),
+            change,
+        }
+    };
+    let mut group = criterion.benchmark_group("estimate_budget");
+    for count in [6, 100] {
+        let (camera, seen) = frame(paper_camera(), count);
+        let survey: Vec<(u32, f64)> = seen.iter().map(|seen| (seen.id, 0.02)).collect();
+        let bend = |seen: &Observation| {
+            let up = 0.3 * (seen.marker_in_tanker.y / 7.13).powi(2);
+            (seen.id, Vector3::new(0.0, 0.0, up))
+        };
+        let flex = vec![FlexMode {
+            name: "wing_bending".to_owned(),
+            time_constant_s: None,
+            shape: seen.iter().map(bend).collect(),
+        }];
+        let calibration = vec![
+            mode("focal_length", &[0, 1], 0.003),
+            mode("principal_point_u", &[2], 3.0),
+            mode("principal_point_v", &[3], 3.0),
+            mode("k1", &[4], 0.02),
+        ];
+        let exact = Estimator::new(EstimatorSettings::default());
+        let only_survey = ErrorBudget::new(&survey, vec![], vec![], 0.0).expect("a budget");
+        let full = ErrorBudget::new(&survey, flex, calibration, 0.5).expect("a budget");
+        for (name, estimator) in [
+            ("none", exact.clone()),
+            ("survey", exact.clone().with_budget(only_survey)),
+            ("full", exact.with_budget(full)),
+        ] {
+            group.bench_function(BenchmarkId::new(name, count), |bencher| {
+                bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
+            });
+        }
+    }
 }
 
 /// One detection is 40 px off: all points fail the test, then every subset is tried.
@@ -206,6 +252,7 @@ criterion_group!(
     stages,
     rays,
     estimates,
+    with_budget,
     exclusion,
     orthogonal_iteration,
     filter,

@@ -1,8 +1,10 @@
 //! What the noise of the pixels does to a pose that is not the maximum likelihood one.
 
-use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix};
+use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use smallvec::SmallVec;
 
 use super::Observation;
+use super::budget::FrameBudget;
 use super::centred_pose::CentredPose;
 use super::collinearity::object_space_weight;
 use super::lanes::symmetric3::Symmetric3;
@@ -14,16 +16,20 @@ use crate::geometry::skew;
 ///
 /// The iteration minimises an error whose weights are not those of the noise, so its covariance is
 /// the sandwich `H⁻¹ B H⁻¹` and not the inverse of its own curvature: `J = [−[R p]×, I]`,
-/// `H = Σ JᵀWJ`, `B = Σ z² JᵀW C WJ`, `C` the covariance of the measured ray `(x, y, 1)`.
+/// `H = Σ JᵀWJ`, `B = Σ z² JᵀW C WJ`, `C` the covariance of the measured ray `(x, y, 1)`. Survey errors add to `C`; a
+/// mode, which moves many points together, adds the square of its whole pull.
 pub(crate) fn sandwich(
     camera: &Camera,
     observations: &[Observation],
     markers_mean: &Point3<f64>,
     pose: &CentredPose,
+    doubts: Option<&FrameBudget>,
 ) -> Option<Matrix6<f64>> {
     let mut curvature = Matrix6::zeros();
     let mut scatter = Matrix6::zeros();
-    for observation in observations {
+    // What each mode does to the gradient at one sigma, over all points.
+    let mut pulls = SmallVec::<[Vector6<f64>; 16]>::new();
+    for (index, observation) in observations.iter().enumerate() {
         let ray = camera.ray_from_pixel(observation.pixel).ok()?;
         let arm = pose.rotation * (observation.marker_in_tanker - markers_mean);
         let depth = arm.z + pose.centre_in_camera.z;
@@ -35,6 +41,32 @@ pub(crate) fn sandwich(
         let noise = ray_noise(camera, ray, observation.sigma_px)? * depth;
         let half = noise.transpose() * wj;
         scatter += half.transpose() * half;
+        let Some(doubts) = doubts else { continue };
+        let point = doubts.point(index);
+        // The ray moves by [1 0 -x; 0 1 -y] / z of what the marker does; times the depth.
+        let ray_by_point = Matrix3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y, 0.0, 0.0, 0.0);
+        let half = ray_by_point.transpose() * wj;
+        scatter += half.transpose() * half * point.survey_variance_m2;
+        let flex = point
+            .flex
+            .iter()
+            .map(|shift| ray_by_point * (pose.rotation * shift));
+        let (_, pixel_by_ray) = camera.project(ray)?;
+        let ray_by_pixel = pixel_by_ray.try_inverse()? * depth;
+        let image = point.image.iter().map(|shift| {
+            let moved = ray_by_pixel * shift;
+            Vector3::new(moved.x, moved.y, 0.0)
+        });
+        for (mode, shift) in flex.chain(image).enumerate() {
+            let pull = wj.transpose() * shift;
+            match pulls.get_mut(mode) {
+                Some(sum) => *sum += pull,
+                None => pulls.push(pull),
+            }
+        }
+    }
+    for pull in &pulls {
+        scatter += pull * pull.transpose();
     }
     let inverse = curvature.cholesky()?.inverse();
     let covariance = inverse * scatter * inverse;

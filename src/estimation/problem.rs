@@ -221,8 +221,14 @@ impl<'a> Problem<'a> {
     pub(crate) fn covariance(&self, fit: &Fit) -> Result<Matrix6<f64>, EstimateError> {
         match &fit.solver {
             Some(solver) => Ok(solver.covariance()),
-            None => sandwich(self.camera, self.observations, &self.points.mean, &fit.pose)
-                .ok_or(EstimateError::SINGULAR),
+            None => sandwich(
+                self.camera,
+                self.observations,
+                &self.points.mean,
+                &fit.pose,
+                self.doubts,
+            )
+            .ok_or(EstimateError::SINGULAR),
         }
     }
 

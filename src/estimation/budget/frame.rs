@@ -1,13 +1,14 @@
 //! The budget of one frame: what each point of it may have wrong, in blocks of four beside those of the points.
 
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, Vector2, Vector3};
 use smallvec::SmallVec;
 
-use super::{ErrorBudget, ImageMode};
+use super::{ErrorBudget, ImageMode, MAX_IMAGE_MODES};
 use crate::camera::Camera;
 use crate::estimation::Observation;
 use crate::estimation::lanes::four::{Arithmetic, Four, Kernel, LANES, Lane, Number, vectorised};
 use crate::estimation::lanes::points::{Block, Points};
+use crate::target::MAX_FLEX_MODES;
 
 /// Lanes kept without the heap: 64 points with one flex mode and six modes of the image, or fewer with more.
 const INLINE_LANES: usize = 512;
@@ -33,6 +34,16 @@ pub(crate) struct FrameBudget {
     pub(super) flex_modes: usize,
     pub(super) image_modes: usize,
     pub(super) attitude: Option<AttitudePrior>,
+}
+
+/// What one point may have wrong.
+pub(crate) struct PointBudget {
+    /// Of each coordinate, m².
+    pub(crate) survey_variance_m2: f64,
+    /// Its displacement by each flex mode at one sigma, tanker frame, m.
+    pub(crate) flex: SmallVec<[Vector3<f64>; MAX_FLEX_MODES]>,
+    /// Its shift by each mode of the image at one sigma, px.
+    pub(crate) image: SmallVec<[Vector2<f64>; MAX_IMAGE_MODES]>,
 }
 
 impl FrameBudget {
@@ -126,6 +137,20 @@ impl FrameBudget {
     #[inline(always)]
     pub(super) fn blocks(&self) -> std::slice::ChunksExact<'_, Lane> {
         self.lanes.chunks_exact(self.stride())
+    }
+
+    /// Returns what one point may have wrong.
+    pub(crate) fn point(&self, index: usize) -> PointBudget {
+        let (block, lane) = (index / LANES, index % LANES);
+        let lanes = &self.lanes[block * self.stride()..][..self.stride()];
+        let (flex, image) = lanes[MODES..].split_at(3 * self.flex_modes);
+        let vector = |[x, y, z]: &[Lane; 3]| Vector3::new(x[lane], y[lane], z[lane]);
+        let shift = |[u, v]: &[Lane; 2]| Vector2::new(u[lane], v[lane]);
+        PointBudget {
+            survey_variance_m2: lanes[SURVEY][lane],
+            flex: flex.as_chunks().0.iter().map(vector).collect(),
+            image: image.as_chunks().0.iter().map(shift).collect(),
+        }
     }
 
     /// Returns how many modes there are.
