@@ -66,7 +66,7 @@ pub enum CameraError {
     /// The intrinsics are those of the binned image, where those of full resolution belong.
     #[error(
         "the principal point ({cx}, {cy}) of {array} is the centre of the image after binning by \
-         {binning_x}x{binning_y}: k and p belong to full resolution, or binning to 1"
+         {binning_x}x{binning_y}: k and p must be those of the full resolution, or set binning to 1"
     )]
     BinningApplied {
         array: &'static str,
@@ -74,6 +74,21 @@ pub enum CameraError {
         cy: f64,
         binning_x: u32,
         binning_y: u32,
+    },
+    /// The intrinsics were found at another resolution, or those of the whole are used for a part.
+    #[error(
+        "the principal point ({cx}, {cy}) of {array} is the centre of an image of {}x{}, but width and height say \
+         {width}x{height}: calibrate at the resolution that is used, or scale {array} to it; if the image is a part of \
+         a larger one, set roi, and width and height of the full image",
+        (2.0 * cx).round(),
+        (2.0 * cy).round()
+    )]
+    OtherResolution {
+        array: &'static str,
+        cx: f64,
+        cy: f64,
+        width: u32,
+        height: u32,
     },
     /// Skew, which is not supported.
     #[error("{array}[{index}], the skew, must be 0 (up to {limit:.1e} px), got {value:?}")]

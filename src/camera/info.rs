@@ -1,5 +1,7 @@
 //! The plain data of `sensor_msgs/CameraInfo`, and what its numbers mean.
 
+use std::fmt;
+
 use super::distortion::{BrownConrady, Equidistant, Lens};
 use super::{Camera, CameraError};
 
@@ -56,6 +58,9 @@ const MAX_SIZES_OUTSIDE: f64 = 1.0;
 const USUAL_OFFSET: f64 = 0.04;
 /// From this offset on, in image sizes, another reading of the numbers that puts it at the centre is the likely one.
 const UNUSUAL_OFFSET: f64 = 0.08;
+/// How much the aspect ratios of two usual images differ at most: 16:9 and 5:4, with principal points that are a
+/// little off.
+const MAX_ASPECT_CHANGE: f64 = 1.5;
 /// Largest skew, as a part of the focal length, that is rounding of a calibration and not skew: 1e-3 px at the
 /// edge of an image as wide as the focal length.
 const MAX_SKEW: f64 = 1.0e-6;
@@ -186,8 +191,8 @@ fn check_skew(array: &'static str, values: &[f64], index: usize) -> Result<(), C
 
 /// Checks the principal point against the size of the full image, as far as that is known.
 ///
-/// Also notices two slips that leave each number plausible and the pose wrong: width and height exchanged, and
-/// intrinsics of the binned image beside a binning.
+/// Also notices three slips that leave each number plausible and the pose wrong: width and height exchanged,
+/// intrinsics of the binned image beside a binning, and a calibration made at another resolution.
 fn check_principal_point(
     info: &CameraInfo,
     array: &'static str,
@@ -234,7 +239,77 @@ fn check_principal_point(
             binning_y,
         });
     }
+    if is_of_another_resolution([cx / width, cy / height]) {
+        return Err(CameraError::OtherResolution {
+            array,
+            cx,
+            cy,
+            width: info.width,
+            height: info.height,
+        });
+    }
     Ok(())
+}
+
+/// Returns whether a principal point, in image sizes, is the centre of another image that is larger, or smaller, both
+/// ways, and of nearly the same shape.
+///
+/// An image cut from the sensor so that both its left and its upper part are missing (or both its right and its lower)
+/// looks the same. It is refused too: with the region of interest its numbers are clear, and without it a pose at twice
+/// the distance would be believed.
+fn is_of_another_resolution([x, y]: [f64; 2]) -> bool {
+    let (most, least) = (x.max(y), x.min(y));
+    let is_larger = least > 0.5 + UNUSUAL_OFFSET;
+    let is_smaller = most < 0.5 - UNUSUAL_OFFSET && least >= 0.0;
+    (is_larger || is_smaller) && most <= MAX_ASPECT_CHANGE * least
+}
+
+/// A principal point that is far from the centre of the image, though it may be right: displays as a warning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OffCentre {
+    cx: f64,
+    cy: f64,
+    width: u32,
+    height: u32,
+}
+
+impl fmt::Display for OffCentre {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            cx,
+            cy,
+            width,
+            height,
+        } = self;
+        write!(
+            f,
+            "the principal point ({cx}, {cy}) is far from the centre of the image of {width}x{height}: right if the image \
+             is a part of a larger one (better said with roi, and width and height of the full image), wrong if the \
+             calibration was made at another resolution"
+        )
+    }
+}
+
+impl CameraInfo {
+    /// Returns a warning where the principal point is more than 8 % of the image off its centre.
+    #[must_use]
+    pub fn off_centre(&self, rectified: bool) -> Option<OffCentre> {
+        let (cx, cy) = if rectified {
+            (self.p[2], self.p[6])
+        } else {
+            (self.k[2], self.k[5])
+        };
+        let is_off = |centre: f64, size: u32| {
+            size > 0 && (centre / f64::from(size) - 0.5).abs() > UNUSUAL_OFFSET
+        };
+        let (width, height) = (self.width, self.height);
+        (is_off(cx, width) || is_off(cy, height)).then_some(OffCentre {
+            cx,
+            cy,
+            width,
+            height,
+        })
+    }
 }
 
 /// Returns the values at the indices of fx, fy, cx, cy.

@@ -25,7 +25,7 @@ use nalgebra::{Matrix2, Point2};
 pub use calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};
 pub use error::{CameraError, UndistortError};
 pub use file::{CameraFileError, CameraFileWarning};
-pub use info::{CameraInfo, RegionOfInterest};
+pub use info::{CameraInfo, OffCentre, RegionOfInterest};
 
 use distortion::{Lens, Outside};
 

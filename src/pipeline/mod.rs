@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 use nalgebra::Rotation3;
 
-use crate::camera::{Camera, CameraError, CameraInfo};
+use crate::camera::{Camera, CameraError, CameraInfo, OffCentre};
 use crate::config::Settings;
 use crate::estimation::{EstimateError, Estimator, Initialisation, Observation};
 use crate::target::MarkerMap;
@@ -176,6 +176,16 @@ impl Pipeline {
     pub fn camera(&self) -> Option<(&str, Result<&Camera, &CameraError>)> {
         let latched = self.camera.as_ref()?;
         Some((&latched.frame_id, latched.camera.as_ref()))
+    }
+
+    /// Returns a warning about the principal point of the latest camera info, if it passes and is far from the centre.
+    #[must_use]
+    pub fn off_centre(&self) -> Option<OffCentre> {
+        let latched = self
+            .camera
+            .as_ref()
+            .filter(|latched| latched.camera.is_ok())?;
+        latched.info.off_centre(self.settings.rectified)
     }
 
     /// Returns the outcome of one frame.

@@ -177,9 +177,14 @@ impl Estimator {
         self.note_camera();
         if result != Ok(true) {
             self.camera_changes.good();
-        } else if was_valid && self.camera_changes.fault((), Instant::now()) {
+        } else if !was_valid || self.camera_changes.fault((), Instant::now()) {
             // Two drivers on one topic change it with every message.
-            log::info!("camera info has changed: {}", self.camera);
+            if was_valid {
+                log::info!("camera info has changed: {}", self.camera);
+            }
+            if let Some(off) = self.pipeline.off_centre() {
+                log::warn!("{off}");
+            }
         }
         if let (Some(predicted), true) = (&mut self.outputs.predicted_points, self.active) {
             predicted.on_camera_info(&message.header, &self.pipeline, &mut self.tally);

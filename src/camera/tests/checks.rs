@@ -142,9 +142,98 @@ fn intrinsics_with_the_binning_already_applied_are_noticed() {
     };
     assert_eq!(
         raw(binned),
-        "the principal point (127, 103) of k is the centre of the image after binning by 2x2: k and p belong to full \
-         resolution, or binning to 1"
+        "the principal point (127, 103) of k is the centre of the image after binning by 2x2: k and p must be those \
+         of the full resolution, or set binning to 1"
     );
+}
+
+/// The calibration of a 508x412 image with everything in pixels multiplied, for an image of this size.
+fn scaled(factor: f64, width: u32, height: u32) -> CameraInfo {
+    let mut info = sound();
+    (info.width, info.height) = (width, height);
+    for index in [0, 2, 4, 5] {
+        info.k[index] *= factor;
+    }
+    for index in [0, 2, 5, 6] {
+        info.p[index] *= factor;
+    }
+    info
+}
+
+#[test]
+fn calibration_of_another_resolution_is_refused() {
+    let mut of_both = 0;
+    for factor in [
+        0.25,
+        0.5,
+        2.0 / 3.0,
+        0.75,
+        1.25,
+        4.0 / 3.0,
+        1.5,
+        2.0,
+        3.0,
+        4.0,
+    ] {
+        for rectified in [false, true] {
+            let error = Camera::from_info(&scaled(factor, 508, 412), rectified)
+                .expect_err("another resolution");
+            assert!(
+                matches!(error, CameraError::OtherResolution { .. }),
+                "{factor}: {error}"
+            );
+            of_both += 1;
+        }
+    }
+    assert_eq!(of_both, 20);
+    assert_eq!(
+        raw(|info| *info = scaled(2.0, 508, 412)),
+        "the principal point (508, 412) of k is the centre of an image of 1016x824, but width and height say 508x412: \
+         calibrate at the resolution that is used, or scale k to it; if the image is a part of a larger one, set roi, \
+         and width and height of the full image"
+    );
+    // Another shape as well: 1920x1080 and 1280x720 used for 640x480, and 800x600 for 1920x1080.
+    for (of, used) in [
+        ([1920.0, 1080.0], (640, 480)),
+        ([1280.0, 720.0], (640, 480)),
+        ([800.0, 600.0], (1920, 1080)),
+    ] {
+        let mut info = scaled(1.0, used.0, used.1);
+        (info.k[2], info.k[5]) = (of[0] / 2.0, of[1] / 2.0);
+        assert!(Camera::from_info(&info, false).is_err(), "{of:?} {used:?}");
+    }
+}
+
+#[test]
+fn part_of_an_image_passes_with_its_region_and_without_where_it_is_clear() {
+    // The whole calibrated at 1016x824, its upper left quarter read out.
+    let mut quarter = scaled(2.0, 1016, 824);
+    quarter.roi = RegionOfInterest {
+        width: 508,
+        height: 412,
+        ..RegionOfInterest::default()
+    };
+    assert!(Camera::from_info(&quarter, false).is_ok());
+    assert_eq!(quarter.off_centre(false), None);
+    // Without the region: rows cut off at the top, at the bottom, and two opposite corners.
+    for (cx, cy) in [
+        (254.0, 100.0),
+        (254.0, 400.0),
+        (350.0, 120.0),
+        (130.0, 300.0),
+    ] {
+        let mut cut = sound();
+        (cut.k[2], cut.k[5]) = (cx, cy);
+        assert!(Camera::from_info(&cut, false).is_ok(), "({cx}, {cy})");
+        let words = cut.off_centre(false).expect("worth a warning").to_string();
+        assert!(words.contains("508x412"), "{words}");
+    }
+    // A lens that sits a little askew.
+    let mut askew = sound();
+    (askew.k[2], askew.k[5]) = (254.0 + 0.07 * 508.0, 206.0 + 0.09 * 412.0);
+    assert!(Camera::from_info(&askew, false).is_ok());
+    assert_eq!(sound().off_centre(false), None);
+    assert_eq!(sound().off_centre(true), None);
 }
 
 #[test]
