@@ -112,12 +112,14 @@ impl ExpectedAttitude {
     }
 
     /// Returns what a deviation that lasts means: how far, where the tanker is found, and what would explain it.
+    ///
+    /// The verb says whether the tanker "stands" so now, or "stood up to" so far off.
     #[must_use]
-    pub fn in_words(&self, deviation: &UnitQuaternion<f64>) -> String {
+    pub fn in_words(&self, verb: &str, deviation: &UnitQuaternion<f64>) -> String {
         let off_deg = deviation.angle().to_degrees();
         let found = deviation.to_rotation_matrix() * self.nominal.rotation();
         format!(
-            "the tanker stands {off_deg:.1}° off its nominal attitude (found {}; nominal {}; limit {}°): {}",
+            "the tanker {verb} {off_deg:.1}° off its nominal attitude (found {}; nominal {}; limit {}°): {}",
             Angles::of(&found),
             self.nominal,
             shown(self.limit_deg),
@@ -284,7 +286,10 @@ mod tests {
     fn found(told: &ExpectedAttitude, truth: &ExpectedAttitude, flown: Angles) -> (f64, String) {
         let camera_from_tanker = truth.receiver_from_camera().inverse() * flown.rotation();
         let deviation = told.deviation(&UnitQuaternion::from_rotation_matrix(&camera_from_tanker));
-        (deviation.angle().to_degrees(), told.in_words(&deviation))
+        (
+            deviation.angle().to_degrees(),
+            told.in_words("stands", &deviation),
+        )
     }
 
     #[test]

@@ -25,10 +25,7 @@ pub(super) enum Silence {
     NoTrack,
     #[error("the covariance of the position gives no probability")]
     NoProbability,
-    #[error(
-        "the tanker stands {:.1}° off its nominal attitude, or did within the last seconds, expected are {}° at most: \
-         see unexpected_attitude", .0.off_deg, .0.limit_deg
-    )]
+    #[error("{0}: see unexpected_attitude")]
     UnexpectedAttitude(Unexpected),
 }
 

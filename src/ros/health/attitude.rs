@@ -1,25 +1,58 @@
 //! A tanker that stands off its nominal attitude for long: no manoeuvre, but a wrong mount or a wrong nominal attitude.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
 use nalgebra::UnitQuaternion;
 
 use crate::refuelling::ExpectedAttitude;
 
-/// How long all poses must be off, or not be off again.
+/// How long poses must be off in all, without a clearly good one in between.
 const LASTING: Duration = Duration::from_secs(3);
-/// How many of them at least.
+/// How many of them at least, and of good ones for the end.
 const MANY: u32 = 10;
+/// Of the limit: below it a pose is clearly good. A tanker that nods past the limit and back says nothing new.
+const CLEARLY_GOOD: f64 = 0.5;
+/// How long all poses must be clearly good before a fault that nobody mended is over.
+const GOOD_AGAIN: Duration = Duration::from_secs(10);
 /// s; over this time poses are averaged: one far away may be off by many degrees, and so may its neighbour by others.
 const SMOOTHED_S: f64 = 1.0;
 
 /// How a tanker stands off its nominal attitude, and the limit, deg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unexpected {
-    /// Smoothed angle to the nominal attitude.
+    /// Smoothed angle to the nominal attitude; below the limit if the fault lasts on.
     pub off_deg: f64,
     /// The largest to expect.
     pub limit_deg: f64,
+}
+
+impl fmt::Display for Unexpected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { off_deg, limit_deg } = self;
+        if off_deg > limit_deg {
+            write!(
+                f,
+                "the tanker stands {off_deg:.1}° off its nominal attitude, expected are {limit_deg}° at most"
+            )
+        } else {
+            write!(
+                f,
+                "the tanker stood more than {limit_deg}° off its nominal attitude for long, and though it is {off_deg:.1}° \
+                 off now, {}",
+                not_over(*limit_deg)
+            )
+        }
+    }
+}
+
+/// Returns what it would take for a fault to end by itself.
+fn not_over(limit_deg: f64) -> String {
+    format!(
+        "it has not been within {}° for {} s yet",
+        CLEARLY_GOOD * limit_deg,
+        GOOD_AGAIN.as_secs()
+    )
 }
 
 /// Compares poses with the nominal attitude.
@@ -28,14 +61,22 @@ pub struct Attitude {
     expected: ExpectedAttitude,
     /// Turn from the nominal attitude, and when it was updated.
     smoothed: Option<(UnitQuaternion<f64>, Instant)>,
-    run: Option<Run>,
-    lasts: bool,
+    off: Off,
+    good: Option<Good>,
+    /// The largest turn since the fault began, while it lasts.
+    fault: Option<UnitQuaternion<f64>>,
 }
 
-/// Poses in a row that all are off, or all are not.
+/// Poses beyond the limit since the last one that was clearly good.
+#[derive(Debug, Default)]
+struct Off {
+    lasted: Duration,
+    poses: u32,
+}
+
+/// Clearly good poses in a row.
 #[derive(Debug)]
-struct Run {
-    is_off: bool,
+struct Good {
     since: Instant,
     poses: u32,
 }
@@ -47,8 +88,12 @@ impl Attitude {
         Self {
             expected,
             smoothed: None,
-            run: None,
-            lasts: false,
+            off: Off {
+                lasted: Duration::ZERO,
+                poses: 0,
+            },
+            good: None,
+            fault: None,
         }
     }
 
@@ -69,57 +114,84 @@ impl Attitude {
     /// Takes the attitude of a trusted pose.
     pub fn take(&mut self, camera_from_tanker: &UnitQuaternion<f64>, now: Instant) {
         let turn = self.expected.deviation(camera_from_tanker);
+        let mut passed = Duration::ZERO;
         let smoothed = match self.smoothed {
             Some((before, then)) if now.saturating_duration_since(then) < LASTING => {
-                let passed_s = now.saturating_duration_since(then).as_secs_f64();
-                let share = 1.0 - (-passed_s / SMOOTHED_S).exp();
+                passed = now.saturating_duration_since(then);
+                let share = 1.0 - (-passed.as_secs_f64() / SMOOTHED_S).exp();
                 let step = (before.inverse() * turn).scaled_axis();
                 before * UnitQuaternion::from_scaled_axis(step * share)
             }
             // Nothing, or too long ago to say anything about now.
             _ => {
-                self.run = None;
+                self.off = Off::default();
+                self.good = None;
                 turn
             }
         };
         self.smoothed = Some((smoothed, now));
-        let is_off = self.is_off();
-        let run = match &mut self.run {
-            Some(run) if run.is_off == is_off => run,
-            run => run.insert(Run {
-                is_off,
-                since: now,
-                poses: 0,
-            }),
-        };
-        run.poses = run.poses.saturating_add(1);
-        if run.poses >= MANY && now.saturating_duration_since(run.since) >= LASTING {
-            self.lasts = is_off;
+        let (off_deg, limit_deg) = (deg(&smoothed), self.expected.limit_deg);
+        if off_deg > limit_deg {
+            self.on_off(smoothed, passed);
+        } else if off_deg < CLEARLY_GOOD * limit_deg {
+            self.on_good(now);
+        } else {
+            self.good = None;
         }
     }
 
-    /// Returns how the tanker is off, if it is, or was for long and not yet for long is no more: what is told of the
+    fn on_off(&mut self, turn: UnitQuaternion<f64>, passed: Duration) {
+        self.good = None;
+        self.off.lasted += passed;
+        self.off.poses = self.off.poses.saturating_add(1);
+        let is_larger = |largest: &UnitQuaternion<f64>| deg(&turn) > deg(largest);
+        let begins = self.off.poses >= MANY && self.off.lasted >= LASTING;
+        if self.fault.as_ref().map_or(begins, is_larger) {
+            self.fault = Some(turn);
+        }
+    }
+
+    fn on_good(&mut self, now: Instant) {
+        self.off = Off::default();
+        let good = self.good.get_or_insert(Good {
+            since: now,
+            poses: 0,
+        });
+        good.poses = good.poses.saturating_add(1);
+        if good.poses >= MANY && now.saturating_duration_since(good.since) >= GOOD_AGAIN {
+            self.fault = None;
+        }
+    }
+
+    /// Returns how the tanker is off, if it is, or was for long and is not clearly good yet: what is told of the
     /// receptacle is then most likely wrong.
     #[must_use]
     pub fn unexpected(&self) -> Option<Unexpected> {
         let (turn, _) = self.smoothed?;
-        (self.lasts || self.is_off()).then(|| Unexpected {
-            off_deg: turn.angle().to_degrees(),
-            limit_deg: self.expected.limit_deg,
-        })
+        let (off_deg, limit_deg) = (deg(&turn), self.expected.limit_deg);
+        (self.fault.is_some() || off_deg > limit_deg).then_some(Unexpected { off_deg, limit_deg })
     }
 
     /// Returns what is wrong and why, while it lasts.
     #[must_use]
     pub fn in_words(&self) -> Option<String> {
-        let (turn, _) = self.smoothed.filter(|_| self.lasts)?;
-        Some(self.expected.in_words(&turn))
+        let largest = self.fault?;
+        let (turn, _) = self.smoothed?;
+        let (off_deg, limit_deg) = (deg(&turn), self.expected.limit_deg);
+        Some(if off_deg > limit_deg {
+            self.expected.in_words("stands", &turn)
+        } else {
+            format!(
+                "{}; {off_deg:.1}° off now, and {}",
+                self.expected.in_words("stood up to", &largest),
+                not_over(limit_deg)
+            )
+        })
     }
+}
 
-    fn is_off(&self) -> bool {
-        self.smoothed
-            .is_some_and(|(turn, _)| turn.angle().to_degrees() > self.expected.limit_deg)
-    }
+fn deg(turn: &UnitQuaternion<f64>) -> f64 {
+    turn.angle().to_degrees()
 }
 
 #[cfg(test)]
@@ -231,16 +303,54 @@ mod tests {
     }
 
     #[test]
-    fn fault_stays_without_poses_and_ends_after_three_seconds_of_good_ones() {
+    fn fault_stays_without_poses_and_ends_after_ten_seconds_of_clearly_good_ones() {
         let mount = pitched(14.0);
         let mut attitude = Attitude::new(expected(mount));
         let off = seen(mount, turned(Vector3::z(), 20.0));
         let now = pass(&mut attitude, Instant::now(), 40, |_| off);
         assert!(attitude.in_words().is_some());
         let good = seen(mount, UnitQuaternion::identity());
-        let now = pass(&mut attitude, now + 100 * LASTING, 25, |_| good);
+        let now = pass(&mut attitude, now + 100 * LASTING, 95, |_| good);
         assert!(attitude.in_words().is_some() && attitude.unexpected().is_some());
         pass(&mut attitude, now, 10, |_| good);
         assert_eq!((attitude.unexpected(), attitude.in_words()), (None, None));
+    }
+
+    /// Mount 18° off; the tanker nods ±5° about that with this period, in frames.
+    fn nodding(period: u32) -> impl FnMut(u32) -> UnitQuaternion<f64> {
+        move |frame| {
+            let phase = std::f64::consts::TAU * f64::from(frame % period) / f64::from(period);
+            seen(pitched(0.0), turned(Vector3::y(), 18.0 + 5.0 * phase.sin()))
+        }
+    }
+
+    #[test]
+    fn tanker_that_nods_does_not_mend_a_wrong_mount() {
+        for period in [60, 200, 600] {
+            let mut attitude = Attitude::new(expected(pitched(0.0)));
+            let now = pass(&mut attitude, Instant::now(), 300, nodding(period));
+            assert!(attitude.in_words().is_some(), "{period}");
+            // Five minutes, frame by frame.
+            let mut nod = nodding(period);
+            let (mut below, mut words) = (0, String::new());
+            for frame in 0..6000 {
+                attitude.take(&nod(frame), now + frame * FRAME);
+                let held = attitude.unexpected().expect("held back all the time");
+                if held.off_deg < held.limit_deg {
+                    below += 1;
+                    words = attitude.in_words().expect("a fault all the time");
+                }
+            }
+            assert!(below > 500 || period == 60, "{period}: {below}");
+            if below > 0 {
+                assert!(words.contains("the tanker stood up to 2"), "{words}");
+                assert!(
+                    words.ends_with("° off now, and it has not been within 7.5° for 10 s yet"),
+                    "{words}"
+                );
+            }
+            assert!(attitude.expect(&expected(pitched(18.0))));
+            assert_eq!(attitude.unexpected(), None);
+        }
     }
 }

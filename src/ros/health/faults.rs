@@ -114,6 +114,8 @@ impl Fault {
 #[derive(Debug)]
 struct Open {
     latest: String,
+    /// Bytes of them that still hold when it is over: what follows is said only while it lasts.
+    lasting: usize,
     since: Instant,
     seen: Instant,
     over: bool,
@@ -122,7 +124,7 @@ struct Open {
 impl Open {
     /// Returns the line for its end: how long it lasted, by when it was seen last, in its last words.
     fn epitaph(&self, fault: Fault, now: Instant) -> String {
-        let (name, latest) = (fault.name(), &self.latest);
+        let (name, latest) = (fault.name(), &self.latest[..self.lasting]);
         let seconds = self
             .seen
             .saturating_duration_since(self.since)
@@ -151,16 +153,25 @@ impl Faults {
 
     /// Takes note of a fault of something of which there are many.
     pub fn see_of(&mut self, fault: Fault, of: &str, words: &str, now: Instant) {
+        self.see_while(fault, of, words, "", now);
+    }
+
+    /// Takes note of a fault with what it does while it lasts, which the line for its end leaves out.
+    pub fn see_while(&mut self, fault: Fault, of: &str, words: &str, doing: &str, now: Instant) {
         let key = (fault, of.to_owned());
+        let lasting = words.len();
+        let words = format!("{words}{doing}");
         if let Some(open) = self.open.get_mut(&key) {
             open.seen = now;
             open.over = false;
-            words.clone_into(&mut open.latest);
+            open.latest = words;
+            open.lasting = lasting;
             return;
         }
         log::warn!("{}: {words}", fault.name());
         let open = Open {
-            latest: words.to_owned(),
+            latest: words,
+            lasting,
             since: now,
             seen: now,
             over: false,
@@ -255,6 +266,19 @@ mod tests {
         assert_eq!(
             open.epitaph(Fault::SuspectMarker, start + 7 * SECOND),
             "suspect_marker is over after 6.0 s: all 90 poses"
+        );
+    }
+
+    #[test]
+    fn end_does_not_repeat_what_the_fault_did_while_it_lasted() {
+        let (mut faults, start) = (Faults::default(), Instant::now());
+        let (fault, doing) = (Fault::UnexpectedAttitude, "; outputs are held back");
+        faults.see_while(fault, "", "20° off", doing, start);
+        assert_eq!(open(&faults), [(fault, "20° off; outputs are held back")]);
+        let ended = &faults.open[&(fault, String::new())];
+        assert_eq!(
+            ended.epitaph(fault, start),
+            "unexpected_attitude is over after 0.0 s: 20° off"
         );
     }
 

@@ -410,14 +410,15 @@ impl Watch {
         let Some(words) = self.attitude.as_ref().and_then(Attitude::in_words) else {
             return;
         };
-        let until = "until camera_mount_* or nominal_* are corrected, or max_attitude_deviation_deg allows it";
+        let until = "until camera_mount_* or nominal_* are corrected, max_attitude_deviation_deg allows it, or ~/reset is called";
         let consequence = if self.holds_outputs {
             "receptacle and the outputs to flight stacks are held back"
         } else {
             "this lasts"
         };
-        let words = format!("{words}; {consequence} {until}");
-        self.faults.see(Fault::UnexpectedAttitude, &words, now);
+        let doing = format!("; {consequence} {until}");
+        self.faults
+            .see_while(Fault::UnexpectedAttitude, "", &words, &doing, now);
     }
 
     fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
