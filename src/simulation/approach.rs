@@ -6,8 +6,9 @@ use nalgebra::{Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Scene, pose_in_camera};
+use super::{Scene, World, pose_in_camera};
 use crate::camera::Camera;
+use crate::estimation::ErrorBudget;
 use crate::pipeline::Detection;
 use crate::target::MarkerMap;
 
@@ -53,6 +54,9 @@ const SWAY_M: f64 = 0.4;
 /// s; periods of sway, roll, pitch and yaw: air behind a tanker, without a common multiple.
 const PERIODS_S: [f64; 4] = [11.0, 5.3, 7.1, 8.7];
 
+/// Stream of the generator that draws the world; images have those from 1 on.
+const WORLD_STREAM: u64 = u64::MAX;
+
 /// A seeded approach: the same settings give the same bits.
 #[derive(Debug, Clone)]
 pub struct Approach {
@@ -60,6 +64,8 @@ pub struct Approach {
     camera: Camera,
     map: MarkerMap,
     phases: [f64; 4],
+    /// Where tanker and camera are not as map and calibration have them.
+    world: Option<World>,
 }
 
 /// One image of an approach.
@@ -84,6 +90,20 @@ impl Approach {
             camera,
             map,
             phases,
+            world: None,
+        }
+    }
+
+    /// Returns the same approach in a world that a budget allows: survey and calibration are drawn once, the airframe
+    /// moves, the image shakes. Camera and map stay what is believed.
+    #[must_use]
+    pub fn in_a_world_of(self, budget: &ErrorBudget) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
+        random.set_stream(WORLD_STREAM);
+        let world = World::draw(&self.camera, self.map.markers(), budget, &mut random);
+        Self {
+            world: Some(world),
+            ..self
         }
     }
 
@@ -104,11 +124,19 @@ impl Approach {
     pub fn frame(&self, index: u32) -> SimulatedFrame {
         let time_s = f64::from(index) / self.settings.rate_hz;
         let truth_camera_from_tanker = self.truth(time_s);
-        let scene = Scene::new(self.camera.clone(), &self.map, truth_camera_from_tanker);
         let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
         random.set_stream(u64::from(index) + 1);
-        let detections = scene
-            .noisy_observations(self.settings.sigma_px, &mut random)
+        let sigma_px = self.settings.sigma_px;
+        let seen = match &self.world {
+            None => Scene::new(self.camera.clone(), &self.map, truth_camera_from_tanker)
+                .noisy_observations(sigma_px, &mut random),
+            Some(world) => {
+                world
+                    .at(time_s)
+                    .observe(&truth_camera_from_tanker, sigma_px, &mut random)
+            }
+        };
+        let detections = seen
             .into_iter()
             .map(|seen| Detection {
                 id: seen.id,
@@ -161,7 +189,8 @@ impl Approach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::paper_camera;
+    use crate::estimation::FlexMode;
+    use crate::simulation::{paper_camera, paper_scene};
 
     fn approach(seed: u64) -> Approach {
         let map = MarkerMap::shipped("paper").expect("shipped");
@@ -182,6 +211,33 @@ mod tests {
         let backward: Vec<_> = (0..20).rev().map(|k| b.frame(k)).collect();
         assert!(forward.iter().eq(backward.iter().rev()));
         assert_ne!(approach(8).frame(3), forward[3]);
+    }
+
+    #[test]
+    fn a_world_is_the_same_in_any_order_and_its_airframe_moves() {
+        let markers = paper_scene().markers().to_vec();
+        let bend = |marker: &crate::target::Marker| (marker.id, Vector3::new(0.0, 0.0, 0.3));
+        let flex = FlexMode {
+            name: "wing".to_owned(),
+            time_constant_s: Some(2.0),
+            shape: markers.iter().map(bend).collect(),
+        };
+        let budget = ErrorBudget::new(&[(1, 0.1)], vec![flex], vec![], 0.0).expect("a budget");
+        let [a, b] = [(); 2].map(|()| approach(7).in_a_world_of(&budget));
+        let forward: Vec<_> = (0..20).map(|k| a.frame(k)).collect();
+        let backward: Vec<_> = (0..20).rev().map(|k| b.frame(k)).collect();
+        assert!(forward.iter().eq(backward.iter().rev()));
+        let mut squares = 0.0;
+        for k in 0..2000_u32 {
+            let amplitude = a
+                .world
+                .as_ref()
+                .expect("a world")
+                .at(f64::from(k))
+                .flex_sigmas()[0];
+            squares += amplitude * amplitude / 2000.0;
+        }
+        assert!((squares - 1.0).abs() < 0.1, "{squares}");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! A world that differs from what the estimator believes, drawn from an error budget.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point3, Vector3};
-use rand::Rng;
+use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::camera::{CalibrationChange, Camera, Ray};
@@ -20,7 +22,12 @@ pub struct World {
     budget: ErrorBudget,
     /// Amplitude of each flex mode in its sigmas.
     flex_sigmas: Vec<f64>,
+    /// Phases of the waves that move each flex mode, rad.
+    phases: Vec<[f64; WAVES_PER_CONSTANT.len()]>,
 }
+
+/// Periods of the waves that move a flex mode, in its time constants; without a common multiple.
+const WAVES_PER_CONSTANT: [f64; 4] = [3.1, 4.7, 7.3, 11.9];
 
 impl World {
     /// Returns a world as a budget says that it may be: survey, calibration and flex are drawn once.
@@ -44,13 +51,38 @@ impl World {
                 change + mode.change * normal(random)
             });
         let flex_sigmas = budget.flex().iter().map(|_| normal(random)).collect();
+        let phases = budget
+            .flex()
+            .iter()
+            .map(|_| WAVES_PER_CONSTANT.map(|_| random.random_range(0.0..TAU)))
+            .collect();
         Self {
             camera: camera.with_change(&change),
             believed: markers.to_vec(),
             surveyed,
             budget: budget.clone(),
             flex_sigmas,
+            phases,
         }
+    }
+
+    /// Returns the world at a time: flex modes with a time constant move as a sum of waves of one sigma altogether, the
+    /// same whatever was asked before.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> Self {
+        let mut world = self.clone();
+        let modes = self.budget.flex().iter().zip(&self.phases);
+        for ((mode, phases), amplitude) in modes.zip(&mut world.flex_sigmas) {
+            let Some(time_constant_s) = mode.time_constant_s else {
+                continue;
+            };
+            let waves = WAVES_PER_CONSTANT.iter().zip(phases);
+            let sum: f64 = waves
+                .map(|(period, phase)| (TAU * time_s / (period * time_constant_s) + phase).sin())
+                .sum();
+            *amplitude = sum * (2.0 / WAVES_PER_CONSTANT.len() as f64).sqrt();
+        }
+        world
     }
 
     /// Returns the camera that makes the images.
