@@ -21,9 +21,9 @@ const FIXED_POINT_TOLERANCE: f64 = 1e-7;
 /// under 1e-13 of the chosen one's.
 pub(crate) const NEGLIGIBLE: f64 = 60.0;
 
-/// Share of the chi-squared that one step promises which a fit certainly does not fall below: far from a minimum a
-/// step promises too little or too much, but hardly by this factor.
-const SURE_SHARE: f64 = 0.25;
+/// Share of the chi-squared that one step promises which a fit certainly does not fall below. Far from a minimum a step
+/// promises too much or too little; a quarter was once too bold for the descent of the cost.
+const SURE_SHARE: f64 = 0.1;
 
 /// A frame with its camera: what every start and every rival pose shares.
 #[derive(Debug)]
