@@ -2,8 +2,9 @@
 
 use nalgebra::Rotation3;
 
-use super::{ConsumerConfiguration, Parameters, Settings};
-use crate::estimation::{EstimatorSettings, Initialisation, Refinement};
+use super::table::Values;
+use super::{CalibrationSigmas, ConsumerConfiguration, Input, Parameters, Settings};
+use crate::estimation::{EstimatorSettings, Initialisation};
 use crate::geometry::optical_from_body;
 use crate::refuelling::{Angles, ExpectedAttitude};
 use crate::tracking::FilterSettings;
@@ -52,82 +53,57 @@ impl Configuration {
     }
 }
 
-/// Which messages bring the detections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Input {
-    /// `tanker_pose/FeaturePointArray`.
-    FeaturePoints,
-    /// `vision_msgs/Detection2DArray`.
-    Detections,
-    /// `apriltag_msgs/AprilTagDetectionArray`.
-    AprilTags,
-}
-
 impl From<&Parameters> for Configuration {
     /// Returns the parameters' meaning; every checked set of values has one.
     fn from(parameters: &Parameters) -> Self {
+        let values = Values::from(parameters);
         Self {
             settings: Settings {
-                calibration: crate::config::CalibrationSigmas::default(),
-                estimator: estimator_settings(parameters),
-                pixel_sigma_px: parameters.double("pixel_sigma_px"),
-                edge_margin_px: parameters.double("edge_margin_px"),
-                rectified: parameters.bool("rectified"),
-                track: parameters
-                    .bool("track")
-                    .then(|| filter_settings(parameters)),
+                calibration: CalibrationSigmas::default(),
+                estimator: estimator_settings(&values),
+                pixel_sigma_px: values.pixel_sigma_px,
+                edge_margin_px: values.edge_margin_px,
+                rectified: values.rectified,
+                track: values.track.then(|| filter_settings(&values)),
             },
-            marker_map: parameters.text("marker_map").to_owned(),
-            tanker_frame_id: parameters.text("tanker_frame_id").to_owned(),
-            publish_tf: parameters.bool("publish_tf"),
-            use_sim_time: parameters.bool("use_sim_time"),
-            lifecycle: parameters.bool("lifecycle"),
-            publish_markers: parameters.bool("publish_markers"),
-            publish_predicted_points: parameters.bool("publish_predicted_points"),
-            input: match parameters.text("input") {
-                "detections" => Input::Detections,
-                "apriltags" => Input::AprilTags,
-                _ => Input::FeaturePoints,
-            },
-            max_hamming: i32::try_from(parameters.count("max_hamming")).unwrap_or(0),
-            consumers: ConsumerConfiguration::from(parameters),
-            expected_attitude: expected_attitude(parameters),
+            expected_attitude: expected_attitude(&values),
+            consumers: ConsumerConfiguration::from(&values),
+            marker_map: values.marker_map,
+            tanker_frame_id: values.tanker_frame_id,
+            publish_tf: values.publish_tf,
+            use_sim_time: values.use_sim_time,
+            lifecycle: values.lifecycle,
+            publish_markers: values.publish_markers,
+            publish_predicted_points: values.publish_predicted_points,
+            input: values.input,
+            max_hamming: values.max_hamming,
         }
     }
 }
 
-fn estimator_settings(parameters: &Parameters) -> EstimatorSettings {
+fn estimator_settings(values: &Values) -> EstimatorSettings {
     EstimatorSettings {
-        initialisation: match parameters.text("initialisation") {
-            "dlt" => Initialisation::Dlt,
-            "previous" => Initialisation::Previous,
-            "global" => Initialisation::Global,
-            _ => Initialisation::Nominal,
-        },
-        refinement: match parameters.text("refinement") {
-            "none" => Refinement::None,
-            _ => Refinement::MaximumLikelihood,
-        },
-        nominal_camera_from_tanker: nominal_attitude(parameters),
-        min_points: parameters.count("min_points"),
-        max_outliers: parameters.count("max_outliers"),
-        trust_probability: parameters.double("trust_probability"),
-        max_ambiguity: parameters.double("max_ambiguity"),
+        initialisation: values.initialisation,
+        refinement: values.refinement,
+        nominal_camera_from_tanker: nominal_attitude(values),
+        min_points: values.min_points,
+        max_outliers: values.max_outliers,
+        trust_probability: values.trust_probability,
+        max_ambiguity: values.max_ambiguity,
         attitude_sigma_rad: None,
     }
 }
 
-fn filter_settings(parameters: &Parameters) -> FilterSettings {
-    let confirm_frames = parameters.count("confirm_frames");
+fn filter_settings(values: &Values) -> FilterSettings {
     FilterSettings {
-        acceleration_density_mps2: parameters.double("acceleration_density_mps2"),
-        angular_acceleration_density_dps2: parameters.double("angular_acceleration_density_dps2"),
-        manoeuvre_factor: parameters.double("manoeuvre_factor"),
-        initial_speed_sigma_mps: parameters.double("initial_speed_sigma_mps"),
-        initial_rate_sigma_dps: parameters.double("initial_rate_sigma_dps"),
-        gate_probability: parameters.double("gate_probability"),
-        max_gap_s: parameters.double("max_gap_s"),
-        confirm_frames: u32::try_from(confirm_frames).unwrap_or(u32::MAX),
+        acceleration_density_mps2: values.acceleration_density_mps2,
+        angular_acceleration_density_dps2: values.angular_acceleration_density_dps2,
+        manoeuvre_factor: values.manoeuvre_factor,
+        initial_speed_sigma_mps: values.initial_speed_sigma_mps,
+        initial_rate_sigma_dps: values.initial_rate_sigma_dps,
+        gate_probability: values.gate_probability,
+        max_gap_s: values.max_gap_s,
+        confirm_frames: values.confirm_frames,
         ..FilterSettings::default()
     }
 }
@@ -144,25 +120,24 @@ pub fn nominal_camera_from_tanker(
     optical_from_body() * receiver_from_camera_body.inverse() * receiver_from_tanker
 }
 
-fn nominal_attitude(parameters: &Parameters) -> Rotation3<f64> {
-    let ExpectedAttitude { mount, nominal, .. } = expected_attitude(parameters);
+fn nominal_attitude(values: &Values) -> Rotation3<f64> {
+    let ExpectedAttitude { mount, nominal, .. } = expected_attitude(values);
     nominal_camera_from_tanker(&nominal.rotation(), &mount.rotation())
 }
 
-pub(super) fn expected_attitude(parameters: &Parameters) -> ExpectedAttitude {
+pub(super) fn expected_attitude(values: &Values) -> ExpectedAttitude {
     ExpectedAttitude {
-        mount: angles(parameters, "camera_mount"),
-        nominal: angles(parameters, "nominal"),
-        limit_deg: parameters.double("max_attitude_deviation_deg"),
-    }
-}
-
-fn angles(parameters: &Parameters, prefix: &str) -> Angles {
-    let angle_deg = |axis: &str| parameters.double(&format!("{prefix}_{axis}_deg"));
-    Angles {
-        roll_deg: angle_deg("roll"),
-        pitch_deg: angle_deg("pitch"),
-        yaw_deg: angle_deg("yaw"),
+        mount: Angles {
+            roll_deg: values.camera_mount_roll_deg,
+            pitch_deg: values.camera_mount_pitch_deg,
+            yaw_deg: values.camera_mount_yaw_deg,
+        },
+        nominal: Angles {
+            roll_deg: values.nominal_roll_deg,
+            pitch_deg: values.nominal_pitch_deg,
+            yaw_deg: values.nominal_yaw_deg,
+        },
+        limit_deg: values.max_attitude_deviation_deg,
     }
 }
 
@@ -170,6 +145,7 @@ fn angles(parameters: &Parameters, prefix: &str) -> Angles {
 mod tests {
     use super::*;
     use crate::config::ParameterValue::{Bool, Double, Integer, String};
+    use crate::estimation::Refinement;
     use nalgebra::Vector3;
 
     /// Rounding of a few products of sines, no unit.
@@ -324,33 +300,6 @@ mod tests {
                 let filter = track.map(crate::tracking::Filter::new);
                 assert!(matches!(filter, Some(Ok(_))), "{} {value}", spec.name);
             }
-        }
-    }
-
-    #[test]
-    fn every_word_of_input_has_its_own_meaning() {
-        for (word, meaning) in [
-            ("feature_points", Input::FeaturePoints),
-            ("detections", Input::Detections),
-            ("apriltags", Input::AprilTags),
-        ] {
-            assert_eq!(
-                configuration(&[("input", String(word.into()))]).input,
-                meaning
-            );
-        }
-    }
-
-    #[test]
-    fn every_word_of_initialisation_has_its_own_meaning() {
-        for (word, meaning) in [
-            ("nominal", Initialisation::Nominal),
-            ("dlt", Initialisation::Dlt),
-            ("previous", Initialisation::Previous),
-            ("global", Initialisation::Global),
-        ] {
-            let found = configuration(&[("initialisation", String(word.into()))]);
-            assert_eq!(found.settings.estimator.initialisation, meaning);
         }
     }
 }

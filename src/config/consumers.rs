@@ -1,9 +1,10 @@
 //! What refuelling and flight stacks are told, and what that needs.
 
 use nalgebra::{Matrix3, Rotation3};
+use ros2_node::parameters::Key;
 
-use super::Parameters;
 use super::configuration::expected_attitude;
+use super::table::{KEYS, Values};
 
 /// Where the receiver's attitude comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,10 +102,10 @@ impl ConsumerConfiguration {
                 needs,
             };
             if self.refuelling.is_none() {
-                return Err(missing("refuelling"));
+                return Err(missing(KEYS.refuelling.name()));
             }
             if output.needs_attitude && self.attitude.is_none() {
-                return Err(missing("attitude"));
+                return Err(missing(KEYS.attitude.name()));
             }
             if output.needs_track && !self.track {
                 return Err(OutputError::NoTrack {
@@ -117,8 +118,8 @@ impl ConsumerConfiguration {
         // comes, valid or not.
         if self.px4_landing_target && self.px4_fiducial_marker {
             return Err(OutputError::TwoWriters {
-                first: "publish_px4_landing_target",
-                second: "publish_px4_fiducial_marker",
+                first: KEYS.publish_px4_landing_target.name(),
+                second: KEYS.publish_px4_fiducial_marker.name(),
             });
         }
         Ok(())
@@ -131,65 +132,59 @@ impl ConsumerConfiguration {
     }
 
     fn outputs(&self) -> [OutputSpec; 5] {
-        let output = |name, on, needs_attitude, needs_track| OutputSpec {
-            name,
+        let output = |key: &Key<bool>, on, needs_attitude, needs_track| OutputSpec {
+            name: key.name(),
             on,
             needs_attitude,
             needs_track,
         };
+        let keys = KEYS;
         [
-            output("publish_receptacle", self.receptacle, false, true),
+            output(&keys.publish_receptacle, self.receptacle, false, true),
             output(
-                "publish_px4_landing_target",
+                &keys.publish_px4_landing_target,
                 self.px4_landing_target,
                 true,
                 true,
             ),
             output(
-                "publish_px4_fiducial_marker",
+                &keys.publish_px4_fiducial_marker,
                 self.px4_fiducial_marker,
                 true,
                 false,
             ),
             output(
-                "publish_mavros_landing_target",
+                &keys.publish_mavros_landing_target,
                 self.mavros_landing_target,
                 false,
                 false,
             ),
-            output("publish_mavros_pose", self.mavros_pose, true, false),
+            output(&keys.publish_mavros_pose, self.mavros_pose, true, false),
         ]
     }
 }
 
-impl From<&Parameters> for ConsumerConfiguration {
-    fn from(parameters: &Parameters) -> Self {
-        let isotropic = |name| {
-            let sigma = parameters.double(name).to_radians();
+impl From<&Values> for ConsumerConfiguration {
+    fn from(values: &Values) -> Self {
+        let isotropic = |sigma_deg: f64| {
+            let sigma = sigma_deg.to_radians();
             Matrix3::identity() * (sigma * sigma)
         };
         Self {
-            refuelling: match parameters.text("refuelling") {
-                "none" => None,
-                path => Some(path.to_owned()),
-            },
-            receiver_frame_id: parameters.text("receiver_frame_id").to_owned(),
-            receiver_from_camera: expected_attitude(parameters).receiver_from_camera(),
-            receptacle: parameters.bool("publish_receptacle"),
-            px4_landing_target: parameters.bool("publish_px4_landing_target"),
-            px4_fiducial_marker: parameters.bool("publish_px4_fiducial_marker"),
-            mavros_landing_target: parameters.bool("publish_mavros_landing_target"),
-            mavros_pose: parameters.bool("publish_mavros_pose"),
-            attitude: match parameters.text("attitude") {
-                "px4" => Some(AttitudeSource::Px4),
-                "imu" => Some(AttitudeSource::Imu),
-                _ => None,
-            },
-            attitude_max_age_s: parameters.double("attitude_max_age_s"),
-            attitude_covariance: isotropic("attitude_sigma_deg"),
-            attitude_rate_covariance: isotropic("attitude_rate_sigma_dps"),
-            px4_minus_ros_us: parameters.integer("px4_minus_ros_us"),
-            track: parameters.bool("track"),
+            refuelling: values.refuelling.clone(),
+            receiver_frame_id: values.receiver_frame_id.clone(),
+            receiver_from_camera: expected_attitude(values).receiver_from_camera(),
+            receptacle: values.publish_receptacle,
+            px4_landing_target: values.publish_px4_landing_target,
+            px4_fiducial_marker: values.publish_px4_fiducial_marker,
+            mavros_landing_target: values.publish_mavros_landing_target,
+            mavros_pose: values.publish_mavros_pose,
+            attitude: values.attitude.0,
+            attitude_max_age_s: values.attitude_max_age_s,
+            attitude_covariance: isotropic(values.attitude_sigma_deg),
+            attitude_rate_covariance: isotropic(values.attitude_rate_sigma_dps),
+            px4_minus_ros_us: values.px4_minus_ros_us,
+            track: values.track,
         }
     }
 }
@@ -198,6 +193,7 @@ impl From<&Parameters> for ConsumerConfiguration {
 mod tests {
     use super::*;
     use crate::config::ParameterValue::{self, Bool, Double, Integer, String};
+    use crate::config::Parameters;
     use nalgebra::Vector3;
 
     fn found(changes: &[(&str, ParameterValue)]) -> ConsumerConfiguration {
@@ -207,7 +203,7 @@ mod tests {
                 .set(name, value.clone())
                 .expect("the test's values are valid");
         }
-        ConsumerConfiguration::from(&parameters)
+        ConsumerConfiguration::from(&Values::from(&parameters))
     }
 
     #[test]

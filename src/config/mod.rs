@@ -1,19 +1,27 @@
 //! Raw parameters -> checked settings.
 //!
-//! `table` is the one list of parameters with their defaults and ranges; [`Parameters`] keeps values that were held
-//! against it; `configuration` makes of them what the floors below work with. Knows `estimation` and `tracking`; never
-//! a file, a topic or where a value came from.
+//! `table` declares each parameter once; [`Parameters`] keeps values that were held against it; `configuration` makes of
+//! them what the floors below work with. Knows `estimation` and `tracking`; never a file, a topic or where a value came
+//! from.
 
 mod configuration;
 mod consumers;
+mod people;
 mod table;
 #[cfg(test)]
 mod tests;
+mod words;
 
-pub use configuration::{Configuration, Input, nominal_camera_from_tanker};
+pub use configuration::{Configuration, nominal_camera_from_tanker};
 pub use consumers::{AttitudeSource, ConsumerConfiguration, OutputError};
-pub use ros2_node::parameters::{Kind, ParameterError, ParameterSpec, ParameterValue, Parameters};
-pub use table::TABLE;
+pub use people::{parameter_file, parameter_tables};
+pub use ros2_node::parameters::{
+    Key, Kind, ParameterError, ParameterSpec, ParameterValue, Parameters, Words,
+};
+pub use table::{KEYS, Keys, SECTIONS, TABLE};
+pub use words::{Attitude, Input};
+
+use table::Values;
 
 use crate::estimation::EstimatorSettings;
 use crate::tracking::FilterSettings;
@@ -54,5 +62,5 @@ pub struct CalibrationSigmas {
 /// # Errors
 /// [`OutputError`] names the output.
 pub fn check_together(parameters: &Parameters) -> Result<(), OutputError> {
-    ConsumerConfiguration::from(parameters).check()
+    ConsumerConfiguration::from(&Values::from(parameters)).check()
 }

@@ -1,62 +1,68 @@
 //! Command-line options that several tools share.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Rotation3;
 use tanker_pose::camera::{CameraFileError, CameraInfo};
-use tanker_pose::config::{CalibrationSigmas, nominal_camera_from_tanker};
+use tanker_pose::config::{
+    CalibrationSigmas, KEYS, Key, ParameterValue, Words, nominal_camera_from_tanker,
+};
 use tanker_pose::estimation::{Estimator, EstimatorSettings, Initialisation, Refinement};
 use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
 use tanker_pose::pipeline::error_budget;
 use tanker_pose::target::{MapBudget, MarkerMap};
 use tanker_pose::text_file;
 
-/// How a pose is found and judged; the same words as the node's parameters.
+/// How a pose is found and judged; defaults, ranges and words are those of the node's parameters.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Estimator")]
 pub struct EstimatorOptions {
-    /// Where the iteration starts
-    #[arg(long, value_enum, default_value_t = Start::Nominal)]
-    initialisation: Start,
-    /// Which estimate is wanted: none is the paper's orthogonal iteration as it is
-    #[arg(long, value_enum, default_value_t = Estimate::MaximumLikelihood)]
-    refinement: Estimate,
+    /// Where the iteration starts: the nominal attitude (`In_M2`, 3 points), a linear camera matrix (`In_M1`, 6 points, not
+    /// in one plane), the last trusted attitude or else the nominal one (3 points), or all attitudes (4 points)
+    #[arg(long, default_value = Initialisation::WORDS[0], value_parser = word::<Initialisation>())]
+    initialisation: Initialisation,
+    /// Which estimate is wanted: least squared pixel residuals over their variances, or none, the converged orthogonal
+    /// iteration of the paper with its sandwich covariance
+    #[arg(long, default_value = Refinement::WORDS[0], value_parser = word::<Refinement>())]
+    refinement: Refinement,
     /// Standard deviation of pixels that bring none, px
-    #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(1e-3, 100.0))]
+    #[arg(long, value_name = "PX", default_value_t = KEYS.pixel_sigma_px.default(), value_parser = double(KEYS.pixel_sigma_px))]
     pub pixel_sigma_px: f64,
     /// Points nearer than this to the edge of the image are left out, px; 0: none
-    #[arg(long, value_name = "PX", default_value_t = 3.0, value_parser = between(0.0, 1000.0))]
+    #[arg(long, value_name = "PX", default_value_t = KEYS.edge_margin_px.default(), value_parser = double(KEYS.edge_margin_px))]
     pub edge_margin_px: f64,
     /// Fewer points than this give no pose
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(3..))]
-    min_points: u16,
+    #[arg(long, value_name = "N", default_value_t = KEYS.min_points.default(), value_parser = whole(KEYS.min_points))]
+    min_points: usize,
     /// At most this many points of a frame may be left out as wrong
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
-    max_outliers: u8,
+    #[arg(long, value_name = "N", default_value_t = KEYS.max_outliers.default(), value_parser = whole(KEYS.max_outliers))]
+    max_outliers: usize,
     /// Probability with which a correct frame passes the chi-squared test
-    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = between(0.5, 0.999_999))]
+    #[arg(long, value_name = "P", default_value_t = KEYS.trust_probability.default(), value_parser = double(KEYS.trust_probability))]
     trust_probability: f64,
     /// Refuse a frame when a second pose is at least this likely; 1: never
-    #[arg(long, value_name = "RATIO", default_value_t = 0.1, value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "RATIO", default_value_t = KEYS.max_ambiguity.default(), value_parser = double(KEYS.max_ambiguity))]
     max_ambiguity: f64,
     /// Roll of the tanker relative to the receiver in the nominal attitude, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.nominal_roll_deg.default(), value_parser = double(KEYS.nominal_roll_deg))]
     nominal_roll_deg: f64,
     /// Pitch, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.nominal_pitch_deg.default(), value_parser = double(KEYS.nominal_pitch_deg))]
     nominal_pitch_deg: f64,
     /// Yaw, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.nominal_yaw_deg.default(), value_parser = double(KEYS.nominal_yaw_deg))]
     nominal_yaw_deg: f64,
     /// Roll of the camera in the receiver, degrees; all zero: it looks straight ahead, upright
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.camera_mount_roll_deg.default(), value_parser = double(KEYS.camera_mount_roll_deg))]
     camera_mount_roll_deg: f64,
     /// Pitch, degrees; positive looks down
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.camera_mount_pitch_deg.default(), value_parser = double(KEYS.camera_mount_pitch_deg))]
     camera_mount_pitch_deg: f64,
     /// Yaw, degrees; positive looks left
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(-180.0, 180.0))]
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.camera_mount_yaw_deg.default(), value_parser = double(KEYS.camera_mount_yaw_deg))]
     camera_mount_yaw_deg: f64,
     /// Standard deviation of the attitude about the nominal one, degrees; 0: nothing is known of it
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(0.0, 45.0))]
@@ -78,42 +84,12 @@ pub struct EstimatorOptions {
     jitter_px: f64,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum Start {
-    /// `In_M2`: the nominal attitude; 3 points
-    Nominal,
-    /// `In_M1`: the linear camera matrix; 6 points, not in one plane
-    Dlt,
-    /// The last trusted attitude, or the nominal one; 3 points
-    Previous,
-    /// All attitudes; 4 points
-    Global,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-#[value(rename_all = "snake_case")]
-enum Estimate {
-    /// Least squared pixel residuals over their variances
-    MaximumLikelihood,
-    /// The converged orthogonal iteration, with its sandwich covariance
-    None,
-}
-
 impl EstimatorOptions {
     /// Returns the settings that the options say.
     pub fn settings(&self) -> EstimatorSettings {
         EstimatorSettings {
-            initialisation: match self.initialisation {
-                Start::Nominal => Initialisation::Nominal,
-                Start::Dlt => Initialisation::Dlt,
-                Start::Previous => Initialisation::Previous,
-                Start::Global => Initialisation::Global,
-            },
-            refinement: match self.refinement {
-                Estimate::MaximumLikelihood => Refinement::MaximumLikelihood,
-                Estimate::None => Refinement::None,
-            },
+            initialisation: self.initialisation,
+            refinement: self.refinement,
             nominal_camera_from_tanker: nominal_camera_from_tanker(
                 &turned(
                     self.nominal_roll_deg,
@@ -126,8 +102,8 @@ impl EstimatorOptions {
                     self.camera_mount_yaw_deg,
                 ),
             ),
-            min_points: usize::from(self.min_points),
-            max_outliers: usize::from(self.max_outliers),
+            min_points: self.min_points,
+            max_outliers: self.max_outliers,
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
             attitude_sigma_rad: (self.attitude_sigma_deg > 0.0)
@@ -155,6 +131,33 @@ fn turned(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> Rotation3<f64> {
         pitch_deg.to_radians(),
         yaw_deg.to_radians(),
     )
+}
+
+/// Returns a parser of an enum's names.
+fn word<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(T::WORDS)
+        .try_map(|word| T::from_word(&word).ok_or("it is none of the words"))
+}
+
+/// Returns a parser of what the parameter of the same name allows.
+fn double(key: Key<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    parser(key, ParameterValue::Double)
+}
+
+/// Returns a parser of what the parameter of the same name allows.
+fn whole(key: Key<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    parser(key, ParameterValue::Integer)
+}
+
+fn parser<Raw: FromStr, T>(
+    key: Key<T>,
+    value: fn(Raw) -> ParameterValue,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text: &str| {
+        let allowed = || format!("expected {}, got {text}", key.spec().kind.allowed());
+        let raw = text.parse().map_err(|_| allowed())?;
+        key.check(value(raw)).map_err(|_| allowed())
+    }
 }
 
 /// Returns the marker map that an option names: a shipped one, or a file.

@@ -1,8 +1,9 @@
-//! `tanker_pose parameters`: what the node would start with under given ROS arguments, without starting it.
+//! `tanker_pose parameters`: what the node would start with under given ROS arguments, without starting it, and what
+//! its parameters are.
 
 use std::io::Write;
 
-use tanker_pose::config::ParameterValue;
+use tanker_pose::config::{ParameterValue, parameter_file, parameter_tables};
 use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::node::{NodeError, effective_parameters};
 
@@ -11,6 +12,12 @@ use crate::ros_options::RosOptions;
 /// Print the parameters that the node would start with under the same ROS arguments, as a parameter file
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
+    /// Print every parameter at its default, with range, unit and meaning, as the shipped parameter file does
+    #[arg(long, conflicts_with_all = ["markdown", "ros_args"])]
+    yaml: bool,
+    /// Print the same as the tables of docs/parameters.md
+    #[arg(long, conflicts_with = "ros_args")]
+    markdown: bool,
     #[command(flatten)]
     ros: RosOptions,
 }
@@ -28,11 +35,17 @@ pub enum ParametersError {
 
 /// Prints the parameters on standard output, and warnings on standard error.
 pub fn run(arguments: &Arguments) -> Result<(), ParametersError> {
+    let mut output = std::io::stdout().lock();
+    if arguments.yaml {
+        return Ok(output.write_all(parameter_file().as_bytes())?);
+    }
+    if arguments.markdown {
+        return Ok(output.write_all(parameter_tables().as_bytes())?);
+    }
     let (names, start) = effective_parameters(&arguments.ros.read()?).map_err(Box::new)?;
     for warning in &start.warnings {
         eprintln!("tanker_pose: warning: {warning}");
     }
-    let mut output = std::io::stdout().lock();
     writeln!(output, "{}:\n  ros__parameters:", names.fully_qualified())?;
     for (name, value) in start.parameters.iter() {
         match value {

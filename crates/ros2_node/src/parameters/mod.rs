@@ -1,26 +1,13 @@
 //! Parameters: what a node declares, and what it does while it runs.
 //!
-//! [`ParameterSpec`] declares one, with its default, its range and a description; [`Parameters`] holds a checked value
-//! for each of a table of them. While the node runs, [`SharedParameters`] answers what its services are asked, and
-//! [`ParameterServices`] are the services themselves.
-//!
-//! ```
-//! use ros2_node::parameters::{ParameterSpec, ParameterValue, Parameters};
-//!
-//! const TABLE: &[ParameterSpec] = &[
-//!     ParameterSpec::double("rate_hz", 10.0, [0.1, 100.0], "Hz, how often it measures"),
-//!     ParameterSpec::text("device", "/dev/ttyS0", "where it is connected").read_only(),
-//! ];
-//!
-//! let mut parameters = Parameters::new(TABLE);
-//! parameters.set("rate_hz", ParameterValue::Integer(20)).expect("20 is allowed");
-//! assert_eq!(parameters.double("rate_hz"), 20.0);
-//!
-//! let refused = parameters.set("rate_hz", ParameterValue::Double(0.0)).unwrap_err();
-//! assert_eq!(refused.to_string(), r#"parameter "rate_hz" must be from 0.1 to 100.0, got 0.0"#);
-//! ```
+//! [`declare_parameters!`](crate::declare_parameters) declares them, each once: with a type, a default, a range, a unit and
+//! words. [`Parameters`] holds a checked value for each, to be read by a typed [`Key`]. While the node runs,
+//! [`SharedParameters`] answers what its services are asked, and [`ParameterServices`] are the services themselves.
+//! [`parameter_file`] and [`markdown_tables`] show the declarations to people.
 
 mod check;
+mod key;
+mod listing;
 #[cfg(test)]
 pub(crate) mod sample;
 #[cfg(feature = "client")]
@@ -33,6 +20,8 @@ mod values;
 #[cfg(feature = "client")]
 mod wire;
 
+pub use key::{Key, Words, count, double, frame_id, integer, one_of, optional_text, switch, text};
+pub use listing::{Section, markdown_tables, parameter_file};
 #[cfg(feature = "client")]
 pub use services::ParameterServices;
 pub use spec::{Kind, ParameterSpec, USE_SIM_TIME};

@@ -82,9 +82,11 @@ pub struct ParameterSpec {
     pub name: &'static str,
     /// What it may be.
     pub kind: Kind,
+    /// Unit of its values; empty where there is none.
+    pub unit: &'static str,
     /// Whether it is fixed once the node runs.
     pub read_only: bool,
-    /// What it does, with its unit, for people.
+    /// What it does, for people.
     pub description: &'static str,
 }
 
@@ -152,6 +154,7 @@ impl ParameterSpec {
         Self {
             name,
             kind,
+            unit: "",
             read_only: false,
             description,
         }
@@ -162,6 +165,15 @@ impl ParameterSpec {
     pub const fn read_only(mut self) -> Self {
         self.read_only = true;
         self
+    }
+
+    /// Returns its unit, if it has one, and what it does.
+    #[must_use]
+    pub fn unit_and_description(&self) -> String {
+        match self.unit {
+            "" => self.description.to_owned(),
+            unit => format!("{unit}, {}", self.description),
+        }
     }
 
     /// Returns the value that holds unless another is set.

@@ -107,7 +107,8 @@ impl SharedParameters {
             }
             match (parameters.spec(name), parameters.get(name)) {
                 (Some(spec), Some(value)) => {
-                    descriptor(name, value, &spec.kind, spec.description, spec.read_only)
+                    let words = spec.unit_and_description();
+                    descriptor(name, value, &spec.kind, &words, spec.read_only)
                 }
                 _ => ParameterDescriptor {
                     name: echoed(name.clone()),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::check::{check, nearest_name};
 use super::spec::ParameterSpec;
-use super::{ParameterError, ParameterValue};
+use super::{Key, ParameterError, ParameterValue};
 
 /// One checked value for every parameter of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,6 +78,18 @@ impl Parameters {
     #[must_use]
     pub fn get(&self, name: &str) -> Option<&ParameterValue> {
         self.values.get(name)
+    }
+
+    /// Returns the value of a parameter in its own type.
+    ///
+    /// # Panics
+    /// When the key is that of another table, which is a mistake in the program.
+    #[must_use]
+    pub fn value<T>(&self, key: &Key<T>) -> T {
+        match self.get(key.name()) {
+            Some(value) => key.must_read(value),
+            None => unreachable_kind(key.name(), None),
+        }
     }
 
     /// Returns the value of a parameter that holds true or false.
