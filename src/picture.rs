@@ -168,7 +168,7 @@ mod tests {
     const ROUNDING_M: f64 = 1e-12;
 
     fn camera() -> Camera {
-        Camera::from_intrinsics(100.0, 200.0, 40.0, 20.0, Some((101, 61))).expect("a pinhole")
+        Camera::from_intrinsics(100.0, 200.0, 40.0, 36.0, Some((101, 61))).expect("a pinhole")
     }
 
     fn map() -> MarkerMap {
@@ -214,7 +214,7 @@ mod tests {
         };
         let detections = [
             detection(1, 58.5, -51.3),
-            detection(6, 50.0, 20.0),
+            detection(6, 50.0, 36.0),
             detection(2, 58.5, 88.9),
         ];
         Picture::new(&camera(), &map(), &detections, &outcome)
@@ -266,7 +266,7 @@ mod tests {
         let [top_left, _, bottom_right, _] = picture(Ok(solution(&Matrix6::identity())))
             .frustum
             .expect("the size is known");
-        let expected = |u: f64, v: f64| Point3::new((u - 40.0) / 50.0, (v - 20.0) / 100.0, 2.0);
+        let expected = |u: f64, v: f64| Point3::new((u - 40.0) / 50.0, (v - 36.0) / 100.0, 2.0);
         assert!((top_left - expected(-0.5, -0.5)).norm() < ROUNDING_M);
         assert!((bottom_right - expected(100.5, 60.5)).norm() < ROUNDING_M);
         let unsized_camera = Camera::from_intrinsics(100.0, 100.0, 0.0, 0.0, None).expect("fine");

@@ -59,7 +59,7 @@ impl From<&Parameters> for Configuration {
         let values = Values::from(parameters);
         Self {
             settings: Settings {
-                calibration: CalibrationSigmas::default(),
+                calibration: calibration_sigmas(&values),
                 estimator: estimator_settings(&values),
                 pixel_sigma_px: values.pixel_sigma_px,
                 edge_margin_px: values.edge_margin_px,
@@ -90,7 +90,26 @@ fn estimator_settings(values: &Values) -> EstimatorSettings {
         max_outliers: values.max_outliers,
         trust_probability: values.trust_probability,
         max_ambiguity: values.max_ambiguity,
-        attitude_sigma_rad: None,
+        attitude_sigma_rad: (values.nominal_attitude_sigma_deg > 0.0)
+            .then(|| values.nominal_attitude_sigma_deg.to_radians()),
+    }
+}
+
+fn calibration_sigmas(values: &Values) -> CalibrationSigmas {
+    CalibrationSigmas {
+        focal_length: values.focal_length_sigma,
+        principal_point_px: values.principal_point_sigma_px,
+        distortion: [
+            values.k1_sigma,
+            values.k2_sigma,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        ],
+        jitter_px: values.jitter_px,
     }
 }
 
@@ -235,6 +254,12 @@ mod tests {
             ("min_points", Integer(5)),
             ("trust_probability", Double(0.95)),
             ("max_ambiguity", Double(0.5)),
+            ("nominal_attitude_sigma_deg", Double(6.0)),
+            ("focal_length_sigma", Double(0.003)),
+            ("principal_point_sigma_px", Double(3.0)),
+            ("k1_sigma", Double(0.02)),
+            ("k2_sigma", Double(0.01)),
+            ("jitter_px", Double(0.4)),
             ("acceleration_density_mps2", Double(0.3)),
             ("angular_acceleration_density_dps2", Double(5.0)),
             ("manoeuvre_factor", Double(2.0)),
@@ -259,6 +284,15 @@ mod tests {
         assert_eq!((estimator.max_outliers, estimator.min_points), (1, 5));
         assert!((estimator.trust_probability - 0.95).abs() < f64::EPSILON);
         assert!((estimator.max_ambiguity - 0.5).abs() < f64::EPSILON);
+        let sigma = estimator.attitude_sigma_rad.expect("a prior");
+        assert!((sigma.to_degrees() - 6.0).abs() < 1e-12);
+        let calibration = CalibrationSigmas {
+            focal_length: 0.003,
+            principal_point_px: 3.0,
+            distortion: [0.02, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            jitter_px: 0.4,
+        };
+        assert_eq!(found.settings.calibration, calibration);
         let track = FilterSettings {
             acceleration_density_mps2: 0.3,
             angular_acceleration_density_dps2: 5.0,

@@ -91,6 +91,22 @@ ros2_node::declare_parameters! {
         max_ambiguity: f64 = double(0.1, [0.0, 1.0]);
     }
 
+    "The error budget: docs/budget.md; survey and flex stand in the marker map" {
+        /// standard deviation of the tanker's attitude about the nominal one, each axis; it tells a flat target from its
+        /// mirror image; 0: nothing is known of the attitude
+        nominal_attitude_sigma_deg: f64 = double(0.0, [0.0, 45.0]).unit("deg");
+        /// standard deviation of the focal length, a share: 0.003 is 0.3 %; 0: the calibration is exact
+        focal_length_sigma: f64 = double(0.0, [0.0, 0.1]);
+        /// standard deviation of each coordinate of the principal point
+        principal_point_sigma_px: f64 = double(0.0, [0.0, 100.0]).unit("px");
+        /// standard deviation of the first coefficient of D
+        k1_sigma: f64 = double(0.0, [0.0, 1.0]);
+        /// standard deviation of the second coefficient of D
+        k2_sigma: f64 = double(0.0, [0.0, 1.0]);
+        /// standard deviation of a shift of the whole image, in u and in v, that differs in each frame: vibration
+        jitter_px: f64 = double(0.0, [0.0, 100.0]).unit("px");
+    }
+
     "The track: odometry, and the start of `previous`" {
         /// turn poses over time into odometry; initialisation previous starts from its prediction;
         /// receptacle and /fmu/in/landing_target_pose need it

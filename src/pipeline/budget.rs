@@ -4,6 +4,7 @@ use crate::camera::{CalibrationChange, FIRST_COEFFICIENT};
 use crate::config::CalibrationSigmas;
 use crate::estimation::{CalibrationMode, ErrorBudget, FlexMode};
 use crate::target::MapBudget;
+use crate::text::{digits, quoted};
 
 /// Returns the budget of a checked map and checked settings.
 #[must_use]
@@ -23,6 +24,45 @@ pub fn error_budget(map: &MapBudget, camera: &CalibrationSigmas) -> ErrorBudget 
         flex.collect(),
         calibration_modes(camera),
         camera.jitter_px,
+    )
+}
+
+/// Returns what map and settings state of their own errors, for people.
+#[must_use]
+pub fn budget_in_words(map: &MapBudget, camera: &CalibrationSigmas) -> String {
+    let sigmas = map.survey_sigma_m.iter().map(|(_, sigma)| *sigma);
+    let survey = match (sigmas.clone().reduce(f64::min), sigmas.reduce(f64::max)) {
+        (Some(least), Some(most)) if (most - least) < 1e-12 => format!("surveyed to {most} m"),
+        (Some(least), Some(most)) => format!("surveyed to {least} to {most} m"),
+        _ => "taken as exact".to_owned(),
+    };
+    let flex: Vec<String> = map
+        .flex
+        .iter()
+        .map(|flex| format!("{} {} m", quoted(&flex.name), flex.sigma_m))
+        .collect();
+    let airframe = if flex.is_empty() {
+        "taken as rigid".to_owned()
+    } else {
+        format!("bends ({})", flex.join(", "))
+    };
+    let calibration = if *camera == CalibrationSigmas::default() {
+        "taken as exact".to_owned()
+    } else {
+        let mut parts = vec![
+            format!("focal length {} %", digits(100.0 * camera.focal_length)),
+            format!("principal point {} px", camera.principal_point_px),
+        ];
+        for (index, sigma) in camera.distortion.iter().enumerate() {
+            if *sigma > 0.0 {
+                parts.push(format!("D[{index}] {sigma}"));
+            }
+        }
+        parts.push(format!("jitter {} px", camera.jitter_px));
+        format!("known to {}", parts.join(", "))
+    };
+    format!(
+        "error budget (1 sigma): markers {survey}, airframe {airframe}, calibration {calibration}"
     )
 }
 
@@ -103,6 +143,25 @@ flex:
         is(budget.calibration()[0].change[1], 0.002);
         is(budget.calibration()[4].change[8], 0.03);
         is(budget.jitter_px(), 0.4);
+    }
+
+    #[test]
+    fn words_say_what_is_taken_as_exact() {
+        let exact = budget_in_words(&MapBudget::default(), &CalibrationSigmas::default());
+        assert_eq!(
+            exact,
+            "error budget (1 sigma): markers taken as exact, airframe taken as rigid, calibration taken as exact"
+        );
+        let map = MarkerMap::from_yaml(MAP, "kite.yaml").expect("a good map");
+        let sigmas = CalibrationSigmas {
+            focal_length: 0.003,
+            distortion: [0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            ..CalibrationSigmas::default()
+        };
+        let words = budget_in_words(map.budget(), &sigmas);
+        assert!(words.contains("markers surveyed to 0.01 m"), "{words}");
+        assert!(words.contains("airframe bends ("), "{words}");
+        assert!(words.contains("D[0] 0.02"), "{words}");
     }
 
     #[test]

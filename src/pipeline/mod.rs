@@ -28,7 +28,7 @@ use crate::config::Settings;
 use crate::estimation::{EstimateError, Estimator, Initialisation, Observation};
 use crate::target::MarkerMap;
 
-pub use budget::error_budget;
+pub use budget::{budget_in_words, error_budget};
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use edge::{ImageEdges, LeftOut};

@@ -31,7 +31,7 @@ use super::reset::ResetService;
 use super::serve::Server;
 use super::start_values::{StartParameterError, StartValues, start_values};
 use crate::config::{self, AttitudeSource, Configuration, Parameters, TABLE};
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, budget_in_words};
 use crate::refuelling::RefuellingSetup;
 use crate::target::{MarkerMap, MarkerMapError};
 use crate::text;
@@ -331,6 +331,8 @@ pub(super) fn introduce(
         topic(CAMERA_INFO),
         published.join(", "),
     );
+    let calibration = &configuration.settings.calibration;
+    log::info!("{}", budget_in_words(map.budget(), calibration));
 }
 
 /// The topics that the node listens to.

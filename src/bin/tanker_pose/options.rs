@@ -65,22 +65,22 @@ pub struct EstimatorOptions {
     #[arg(long, value_name = "DEG", default_value_t = KEYS.camera_mount_yaw_deg.default(), value_parser = double(KEYS.camera_mount_yaw_deg))]
     camera_mount_yaw_deg: f64,
     /// Standard deviation of the attitude about the nominal one, degrees; 0: nothing is known of it
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = between(0.0, 45.0))]
-    attitude_sigma_deg: f64,
+    #[arg(long, value_name = "DEG", default_value_t = KEYS.nominal_attitude_sigma_deg.default(), value_parser = double(KEYS.nominal_attitude_sigma_deg))]
+    nominal_attitude_sigma_deg: f64,
     /// Standard deviation of the focal length, a share: 0.003 is 0.3 %
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = between(0.0, 0.1))]
+    #[arg(long, value_name = "SHARE", default_value_t = KEYS.focal_length_sigma.default(), value_parser = double(KEYS.focal_length_sigma))]
     focal_length_sigma: f64,
     /// Standard deviation of each coordinate of the principal point, px
-    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "PX", default_value_t = KEYS.principal_point_sigma_px.default(), value_parser = double(KEYS.principal_point_sigma_px))]
     principal_point_sigma_px: f64,
     /// Standard deviation of the first coefficient of D
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "SIGMA", default_value_t = KEYS.k1_sigma.default(), value_parser = double(KEYS.k1_sigma))]
     k1_sigma: f64,
     /// Standard deviation of the second coefficient of D
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = between(0.0, 1.0))]
+    #[arg(long, value_name = "SIGMA", default_value_t = KEYS.k2_sigma.default(), value_parser = double(KEYS.k2_sigma))]
     k2_sigma: f64,
     /// Standard deviation of a shift of the whole image that differs in each frame, px
-    #[arg(long, value_name = "PX", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    #[arg(long, value_name = "PX", default_value_t = KEYS.jitter_px.default(), value_parser = double(KEYS.jitter_px))]
     jitter_px: f64,
 }
 
@@ -106,8 +106,8 @@ impl EstimatorOptions {
             max_outliers: self.max_outliers,
             trust_probability: self.trust_probability,
             max_ambiguity: self.max_ambiguity,
-            attitude_sigma_rad: (self.attitude_sigma_deg > 0.0)
-                .then(|| self.attitude_sigma_deg.to_radians()),
+            attitude_sigma_rad: (self.nominal_attitude_sigma_deg > 0.0)
+                .then(|| self.nominal_attitude_sigma_deg.to_radians()),
         }
     }
 
