@@ -2,8 +2,9 @@
 
 use std::fmt;
 
+use super::CameraError;
 use super::distortion::{BrownConrady, Equidistant, Lens};
-use super::{Camera, CameraError};
+use super::model::Camera;
 
 /// `sensor_msgs/CameraInfo` without its header, as plain data: nothing is checked yet.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -80,8 +81,55 @@ const KNOWN_MODELS: &str = "plumb_bob, rational_polynomial, equidistant";
 /// are 0: such a name is never taken for "no distortion".
 const FISHEYE_NAMES: [&str; 6] = ["fish", "equi", "kannala", "omni", "theta", "stereographic"];
 
+impl Camera {
+    /// Returns the checked camera that a camera info describes.
+    ///
+    /// # Inputs
+    /// * `info`: the calibration. Its region of interest and binning are applied as `image_geometry`
+    ///   does: the offset is subtracted from the principal point, then everything is divided by the
+    ///   binning (0 means 1), without a shift by half a pixel. A width and height of 0 mean unknown.
+    /// * `rectified`: whether pixels are those of the rectified image. Then P counts and there is no
+    ///   distortion; otherwise K and D. Rays of rectified pixels are in the rectified camera frame:
+    ///   `r` is not used.
+    ///
+    /// # Errors
+    /// [`CameraError`] with the value at fault: a camera that is not calibrated, numbers that no camera
+    /// has, skew, the baseline of a stereo pair, a lens model that is unknown or has another number of
+    /// coefficients, a region or binning without pixels.
+    ///
+    /// # Source
+    /// REP 104; `sensor_msgs/msg/CameraInfo`.
+    pub fn from_info(info: &CameraInfo, rectified: bool) -> Result<Self, CameraError> {
+        camera(info, rectified)
+    }
+
+    /// Returns the checked pinhole camera with these focal lengths and principal point, px.
+    ///
+    /// # Errors
+    /// As [`Self::from_info`], which this is with `k` made of the four numbers.
+    pub fn from_intrinsics(
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        image_size: Option<(u32, u32)>,
+    ) -> Result<Self, CameraError> {
+        let (width, height) = image_size.unwrap_or_default();
+        let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
+        Self::from_info(
+            &CameraInfo {
+                height,
+                width,
+                k,
+                ..CameraInfo::default()
+            },
+            false,
+        )
+    }
+}
+
 /// Returns the checked camera; see [`Camera::from_info`].
-pub(super) fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, CameraError> {
+fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, CameraError> {
     // ROS marks an uncalibrated camera by k[0] alone, whichever matrix is used.
     if info.k[0] == 0.0 {
         return Err(CameraError::NotCalibrated { fx: info.k[0] });

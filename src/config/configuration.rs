@@ -2,11 +2,12 @@
 
 use nalgebra::Rotation3;
 
+use super::attitude::expected_attitude;
 use super::table::Values;
 use super::{CalibrationSigmas, ConsumerConfiguration, Input, Parameters, Settings};
 use crate::estimation::{EstimatorSettings, Initialisation};
 use crate::geometry::optical_from_body;
-use crate::refuelling::{Angles, ExpectedAttitude};
+use crate::refuelling::ExpectedAttitude;
 use crate::tracking::FilterSettings;
 
 /// Everything that the parameters say, in the types that the node works with.
@@ -142,22 +143,6 @@ pub fn nominal_camera_from_tanker(
 fn nominal_attitude(values: &Values) -> Rotation3<f64> {
     let ExpectedAttitude { mount, nominal, .. } = expected_attitude(values);
     nominal_camera_from_tanker(&nominal.rotation(), &mount.rotation())
-}
-
-pub(super) fn expected_attitude(values: &Values) -> ExpectedAttitude {
-    ExpectedAttitude {
-        mount: Angles {
-            roll_deg: values.camera_mount_roll_deg,
-            pitch_deg: values.camera_mount_pitch_deg,
-            yaw_deg: values.camera_mount_yaw_deg,
-        },
-        nominal: Angles {
-            roll_deg: values.nominal_roll_deg,
-            pitch_deg: values.nominal_pitch_deg,
-            yaw_deg: values.nominal_yaw_deg,
-        },
-        limit_deg: values.max_attitude_deviation_deg,
-    }
 }
 
 #[cfg(test)]

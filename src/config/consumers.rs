@@ -3,17 +3,9 @@
 use nalgebra::{Matrix3, Rotation3};
 use ros2_node::parameters::Key;
 
-use super::configuration::expected_attitude;
+use super::attitude::expected_attitude;
 use super::table::{KEYS, Values};
-
-/// Where the receiver's attitude comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AttitudeSource {
-    /// `px4_msgs/VehicleAttitude`.
-    Px4,
-    /// `sensor_msgs/Imu`.
-    Imu,
-}
+use super::words::AttitudeSource;
 
 /// The optional outputs behind the pose, and what they need.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,15 @@
 //! The parameters that are one of a few words: each an enum, with the one list of its names, the default first.
 
-use super::AttitudeSource;
 use crate::estimation::{Initialisation, Refinement};
+
+/// Where the receiver's attitude comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AttitudeSource {
+    /// `px4_msgs/VehicleAttitude`.
+    Px4,
+    /// `sensor_msgs/Imu`.
+    Imu,
+}
 
 /// Which messages bring the detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,7 @@
 //! The one home of what a pose error is and in which order its covariance stands.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, SMatrix, Vector6};
 
-use super::motion::congruent;
 use super::rotation::skew;
 
 /// Covariance of a pose `b_from_a`, in ROS's convention (`geometry_msgs/PoseWithCovariance`).
@@ -104,6 +103,16 @@ pub fn pose_error(truth: &Isometry3<f64>, found: &Isometry3<f64>) -> Vector6<f64
     Vector6::new(
         position.x, position.y, position.z, rotation.x, rotation.y, rotation.z,
     )
+}
+
+/// Returns `J Σ Jᵀ`, exactly symmetric.
+#[must_use]
+pub fn congruent<const M: usize, const N: usize>(
+    jacobian: &SMatrix<f64, M, N>,
+    covariance: &SMatrix<f64, N, N>,
+) -> SMatrix<f64, M, M> {
+    let full = jacobian * covariance * jacobian.transpose();
+    (full + full.transpose()) * 0.5
 }
 
 #[cfg(test)]

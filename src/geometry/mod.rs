@@ -8,9 +8,9 @@ mod covariance;
 mod motion;
 mod rotation;
 
-pub use covariance::{PoseCovariance, pose_error};
+pub use covariance::{PoseCovariance, congruent, pose_error};
 pub(crate) use motion::set;
-pub use motion::{Matrix12, Motion, Twist, Vector12, congruent, motion_error};
+pub use motion::{Matrix12, Motion, Twist, Vector12, motion_error};
 pub use rotation::{
     axial, cayley, chord, left_jacobian, left_jacobian_inverse, nearest_rotation,
     nearest_rotation_by_svd, optical_from_body, rotation_from_roll_pitch_yaw, skew,

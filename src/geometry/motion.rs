@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
+use super::covariance::congruent;
 use super::{PoseCovariance, pose_error, skew};
 
 /// 12×12, in the order of [`Motion::covariance`].
@@ -121,16 +122,6 @@ pub fn motion_error(truth: &Motion, found: &Motion) -> Vector12 {
         .fixed_rows_mut::<3>(9)
         .copy_from(&(truth.rate_in_b - found.rate_in_b));
     error
-}
-
-/// Returns `J Σ Jᵀ`, exactly symmetric.
-#[must_use]
-pub fn congruent<const M: usize, const N: usize>(
-    jacobian: &SMatrix<f64, M, N>,
-    covariance: &SMatrix<f64, N, N>,
-) -> SMatrix<f64, M, M> {
-    let full = jacobian * covariance * jacobian.transpose();
-    (full + full.transpose()) * 0.5
 }
 
 /// Puts a 3×3 block where it belongs in a Jacobian.

@@ -39,7 +39,35 @@ struct RawMarker {
     sigma: Option<Spanned<f64>>,
 }
 
-pub(super) fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
+impl MarkerMap {
+    /// Returns the checked map from YAML text.
+    ///
+    /// ```
+    /// use tanker_pose::target::MarkerMap;
+    ///
+    /// let text = "
+    /// name: kite
+    /// markers:                 # tanker frame, metres: x forward, y left, z up
+    ///   - {id: 1, x: 0, y: -1, z: 0}
+    ///   - {id: 2, x: 0, y: 1, z: 0}
+    ///   - {id: 2, x: 3, y: 0, z: 0}
+    /// ";
+    /// let error = MarkerMap::from_yaml(text, "kite.yaml").unwrap_err();
+    /// assert_eq!(error.to_string(), "kite.yaml:6:10: marker id 2 is already taken at kite.yaml:5:10");
+    /// ```
+    ///
+    /// # Inputs
+    /// * `text`: the YAML, in the shape shown above; an unknown key is an error.
+    /// * `source`: what errors call the text, usually its path.
+    ///
+    /// # Errors
+    /// Any [`MarkerMapError`], with the line and column of the value at fault.
+    pub fn from_yaml(text: &str, source: &str) -> Result<Self, MarkerMapError> {
+        read(text, source)
+    }
+}
+
+fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
     let raw: RawMap = yaml::read(text, source)?;
     let entries = &raw.markers.value;
     let mut markers = entries

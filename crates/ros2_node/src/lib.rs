@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! node                               all of it together
-//! arguments, rules                   the command line, and the grammar of one value in it
+//! arguments, rules, tokens           the command line, and the grammar of one value in it
 //! environment, distribution          what variables ask for; which ROS 2 the build talks with
 //! names                              the node's and its topics' names after remaps
 //! scalar, parameter_file             what words mean; the sections of a parameter file
@@ -86,3 +86,5 @@ pub mod service;
 pub mod start_values;
 #[cfg(feature = "client")]
 pub mod system_clock;
+#[cfg(feature = "client")]
+mod tokens;

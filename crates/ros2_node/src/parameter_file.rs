@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use granit_parser::{Event, Parser, ScalarStyle, ScanError, Tag};
 
-use super::{rules, scalar};
+use super::{scalar, tokens};
 use crate::parameters::ParameterValue;
 use crate::text::clip;
 
@@ -210,7 +210,7 @@ fn section(values: &Tree, written: &str, path: &Path) -> Result<Section, Paramet
     if written.is_empty() {
         return Err(ParameterFileError::NoNode { path, line });
     }
-    if !rules::is_node_pattern(written) {
+    if !tokens::is_node_pattern(written) {
         let name = clip(written);
         return Err(ParameterFileError::BadNode { path, line, name });
     }

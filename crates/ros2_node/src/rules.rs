@@ -7,6 +7,7 @@ use log::LevelFilter;
 use ros2args::RemapRule;
 
 use super::parameter_file;
+use super::tokens::{is_token, is_word};
 use crate::parameters::ParameterValue;
 use crate::text::clip;
 
@@ -116,19 +117,6 @@ pub(super) fn is_enclave(path: &str) -> bool {
             .is_some_and(|path| path.split('/').all(is_part))
 }
 
-/// Returns whether ROS takes this for a node in a parameter file: names between slashes, of which each may be `*` or `**`.
-pub(super) fn is_node_pattern(written: &str) -> bool {
-    let is_part = |part: &str| {
-        let is_name = !part.starts_with(|first: char| first.is_ascii_digit());
-        matches!(part, "*" | "**") || (is_name && is_word(part.as_bytes()))
-    };
-    written
-        .strip_prefix('/')
-        .unwrap_or(written)
-        .split('/')
-        .all(is_part)
-}
-
 fn sides(argument: &str) -> Result<(&str, &str), String> {
     let (left, right) = argument.split_once(":=").ok_or("it has no :=")?;
     if right.is_empty() {
@@ -160,16 +148,6 @@ fn is_topic(name: &str) -> bool {
         .unwrap_or(name)
         .split('/')
         .all(is_token)
-}
-
-fn is_token(word: &str) -> bool {
-    let begins_well = !word.starts_with(|first: char| first.is_ascii_digit());
-    begins_well && !word.contains("__") && is_word(word.as_bytes())
-}
-
-fn is_word(letters: &[u8]) -> bool {
-    let is_letter = |letter: &u8| letter.is_ascii_alphanumeric() || *letter == b'_';
-    !letters.is_empty() && letters.iter().all(is_letter)
 }
 
 #[cfg(test)]
@@ -239,15 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_and_enclaves_are_checked_part_by_part() {
-        for good in ["n", "/n", "/**", "*/n", "/a/**/n", "__n"] {
-            assert!(is_node_pattern(good), "{good}");
-        }
-        for wrong in [
-            "", "/", "n/", "//n", "a//n", "n*", "***", "1n", "a b", "~/n",
-        ] {
-            assert!(!is_node_pattern(wrong), "{wrong}");
-        }
+    fn enclaves_are_checked_part_by_part() {
         assert!(is_enclave("/") && is_enclave("/left/lidar_1"));
         for wrong in ["", "a", "/a/", "//a", "/1", "/a-b", "/*"] {
             assert!(!is_enclave(wrong), "{wrong}");

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use super::{MAX_ANGLE, MAX_STRETCH, MIN_STRETCH, polynomial, solve_rising};
+use super::limits::{MAX_ANGLE, MAX_STRETCH, MIN_STRETCH};
+use super::polynomial;
+use super::rising::solve_rising;
 
 /// A lens with a radial ratio and a tangential part, with `s = x² + y²`:
 /// ```text

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use super::{MAX_ANGLE, MIN_STRETCH, polynomial, solve_rising};
+use super::limits::{MAX_ANGLE, MIN_STRETCH};
+use super::polynomial;
+use super::rising::solve_rising;
 
 /// Below this radius the distortion is the identity to rounding: its next term is of second order.
 const CENTRE_RADIUS: f64 = 1.0e-9;

@@ -4,9 +4,8 @@
 //! of `~/change_state` waits for that.
 
 mod services;
+mod shared;
 mod states;
-
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ros2_client::Publisher;
 
@@ -14,18 +13,12 @@ use super::clock::NodeClock;
 use super::messages::TransitionEvent;
 use super::participant::{EndpointError, QosProfile, RosNode, reliable};
 use crate::text::quoted;
+pub use shared::Request;
+use shared::SharedState;
 pub use states::{GRAPH, State, Transition, WorkResult};
 
 /// As rcl has it: its default for publishers.
 const EVENTS: QosProfile = reliable(10);
-
-/// A request for a transition that waits for its answer.
-#[derive(Debug)]
-pub struct Request {
-    id: u8,
-    label: String,
-    answer: smol::channel::Sender<bool>,
-}
 
 /// The state of a managed node, with its services open until they are closed.
 pub struct Lifecycle {
@@ -122,30 +115,5 @@ impl Lifecycle {
     /// Ends the services, which have to be gone before the node is.
     pub fn close(self) {
         smol::block_on(self.services.cancel());
-    }
-}
-
-/// The state, shared with the services.
-#[derive(Debug, Clone)]
-struct SharedState(Arc<Mutex<State>>);
-
-impl Default for SharedState {
-    fn default() -> Self {
-        Self(Arc::new(Mutex::new(State::Unconfigured)))
-    }
-}
-
-impl SharedState {
-    fn get(&self) -> State {
-        *self.lock()
-    }
-
-    fn set(&self, state: State) {
-        *self.lock() = state;
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // A state is replaced as a whole: a panic elsewhere cannot leave half of one behind.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -3,8 +3,8 @@
 use futures::future::{join_all, ready};
 use futures::{FutureExt, TryFutureExt};
 
+use super::shared::{Request, SharedState};
 use super::states::{GRAPH, State, Transition};
-use super::{Request, SharedState};
 use crate::messages::{
     ChangeStateRequest, ChangeStateResponse, EmptyRequest, LifecycleState, LifecycleTransition,
     TransitionDescription, TransitionEvent,

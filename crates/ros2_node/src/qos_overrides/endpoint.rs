@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use ros2_client::qos::{Durability, History, Reliability, WhenFull};
 
-use super::PREFIX;
 use crate::parameters::{Kind, ParameterValue};
 use crate::participant::QosProfile;
 
+/// What the names of all these parameters begin with.
+pub const PREFIX: &str = "qos_overrides.";
 /// What ROS's files say for "as it is".
 const SYSTEM_DEFAULT: &str = "system_default";
 /// Most samples that a topic may keep.

@@ -3,15 +3,13 @@
 
 mod endpoint;
 
-pub use endpoint::{Endpoint, Role};
+pub use endpoint::{Endpoint, PREFIX, Role};
 
 use super::participant::QosProfile;
 use crate::parameters::{Kind, ParameterValue};
 use crate::text::quoted;
 use endpoint::Policy;
 
-/// What the names of all these parameters begin with.
-pub const PREFIX: &str = "qos_overrides.";
 /// Why an override cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

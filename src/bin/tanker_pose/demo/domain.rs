@@ -4,7 +4,7 @@ use std::net::{Ipv4Addr, UdpSocket};
 
 use tanker_pose::ros::environment::{DiscoveryRange, Environment};
 
-use super::DemoError;
+use super::error::DemoError;
 
 /// Domains whose ports no system hands out to clients, and above those that people choose.
 const FIRST: u16 = 50;

@@ -7,7 +7,7 @@ use tanker_pose::ros::messages::{EstimatorStatus, PoseWithCovarianceStamped};
 use tanker_pose::simulation::Approach;
 use tanker_pose::target::MarkerMap;
 
-use super::DemoError;
+use super::error::DemoError;
 use super::ledger::{Frame, Ledger};
 use super::live::Live;
 use super::plan::Plan;

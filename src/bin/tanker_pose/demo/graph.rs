@@ -13,7 +13,7 @@ use tanker_pose::ros::participant::{
     NodeOptions, QosProfile, RosNode, Subscription, reliable, within,
 };
 
-use super::DemoError;
+use super::error::DemoError;
 use super::flight::{End, Flight};
 use super::live::Live;
 use super::node_thread::NodeThread;

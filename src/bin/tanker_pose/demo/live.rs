@@ -9,7 +9,8 @@ use tanker_pose::simulation::Approach;
 
 use super::ledger::{Estimate, Frame, Ledger};
 use super::plan::{Block, Plan};
-use super::{plainly, statistics};
+use super::statistics;
+use super::words::plainly;
 use crate::simulate::ApproachOptions;
 use crate::terminal::{progress_bar, say};
 

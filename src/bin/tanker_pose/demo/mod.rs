@@ -1,6 +1,7 @@
 //! `tanker_pose demo`: the whole way over real DDS, measured against the truth.
 
 mod domain;
+mod error;
 mod flight;
 mod graph;
 mod ledger;
@@ -9,23 +10,21 @@ mod node_thread;
 mod plan;
 mod statistics;
 mod summary;
+mod words;
 
 use std::time::Duration;
 
 use async_signal::{Signal, Signals};
 use tanker_pose::config::{Configuration, Parameters, TABLE};
-use tanker_pose::pipeline::OutcomeCode;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments as RosArguments};
-use tanker_pose::ros::environment::EnvironmentError;
-use tanker_pose::ros::names::{NamesError, NodeNames};
-use tanker_pose::ros::node::{NODE_NAME, NodeError};
-use tanker_pose::ros::participant::{EndpointError, OpenError};
+use tanker_pose::ros::names::NodeNames;
+use tanker_pose::ros::node::NODE_NAME;
 use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::target::MarkerMap;
 
 use crate::options::between;
-use crate::simulate::source::SourceError;
-use crate::simulate::{ApproachError, ApproachOptions};
+use crate::simulate::ApproachOptions;
+pub use error::DemoError;
 use flight::{End, Flight};
 use graph::Graph;
 use ledger::Ledger;
@@ -58,54 +57,6 @@ pub struct Arguments {
     verbose: bool,
     #[command(flatten)]
     approach: ApproachOptions,
-}
-
-/// Why the demo cannot run, or did not go well.
-#[derive(Debug, thiserror::Error)]
-pub enum DemoError {
-    #[error(transparent)]
-    Approach(#[from] ApproachError),
-    #[error(
-        "marker map {map:?} has {got} markers, and the node needs {need} for a pose: \
-         a demo with fewer would show refusals only (see min_points in config/tanker_pose.yaml)"
-    )]
-    TooFewMarkers {
-        map: String,
-        got: usize,
-        need: usize,
-    },
-    #[error(transparent)]
-    Argument(#[from] ArgumentError),
-    #[error(transparent)]
-    Environment(#[from] EnvironmentError),
-    #[error(transparent)]
-    Names(#[from] NamesError),
-    #[error(
-        "every domain from {first} to {last} is in use on this host: choose one with --domain-id"
-    )]
-    NoFreeDomain { first: u16, last: u16 },
-    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
-    Signals(std::io::Error),
-    #[error("cannot start the node's thread: {0}")]
-    Thread(std::io::Error),
-    #[error("the node ended: {0}")]
-    Node(Box<NodeError>),
-    #[error("the node's thread ended by itself")]
-    NodeGone,
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    #[error(transparent)]
-    Endpoint(#[from] EndpointError),
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    #[error(
-        "domain {domain_id} already has a publisher of {topic}: choose another with --domain-id"
-    )]
-    DomainInUse { domain_id: u16, topic: &'static str },
-    #[error("node and simulation did not find each other within {wait_s} s: {reason}")]
-    Discovery { wait_s: f64, reason: String },
-    #[error("{missing} of {sent} frames got no outcome: is this machine overloaded?")]
-    Missing { missing: usize, sent: usize },
 }
 
 /// Runs the demo to its end, or until SIGINT or SIGTERM.
@@ -184,9 +135,4 @@ fn node_arguments(marker_map: &str) -> Result<RosArguments, ArgumentError> {
     // Quoted, so that a path that looks like a number stays text.
     let marker_map = format!("marker_map:='{}'", marker_map.replace('\'', "''"));
     Ok(RosArguments::split(&[&words[..], &[marker_map]].concat())?.0)
-}
-
-/// `UNKNOWN_ID` in words that need no manual.
-fn plainly(code: OutcomeCode) -> String {
-    code.name().to_ascii_lowercase().replace('_', " ")
 }

@@ -7,7 +7,7 @@ use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::node::{self, NodeError};
 
-use super::DemoError;
+use super::error::DemoError;
 
 /// The node while it runs.
 pub struct NodeThread {

@@ -8,8 +8,8 @@ use serde::Serialize;
 use tanker_pose::pipeline::OutcomeCode;
 
 use super::ledger::{Estimate, Frame, Ledger};
-use super::plainly;
 use super::statistics::{POSE_DEGREES_OF_FREEDOM, mean, mean_nees_interval, percentile, rms};
+use super::words::plainly;
 
 /// Parts of the route.
 const BINS: [&str; 3] = ["far", "middle", "near"];

@@ -2,6 +2,7 @@
 //!
 //! The settings are the library's ([`Experiment`]); here are threads, files and pictures.
 
+mod error;
 mod figure;
 mod monte_carlo;
 mod panel;
@@ -16,6 +17,7 @@ use std::time::Instant;
 use clap::ValueEnum;
 use tanker_pose::simulation::Experiment;
 
+pub use error::ReproduceError;
 use monte_carlo::Outcome;
 
 /// Images of the single approach drawn beside Fig. 8.
@@ -59,30 +61,6 @@ enum What {
     Stopped,
     /// Everything
     All,
-}
-
-/// Why the tool ends without its results.
-#[derive(Debug, thiserror::Error)]
-pub enum ReproduceError {
-    #[error("cannot make the directory {}: {source}", path.display())]
-    Directory {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error("cannot write {}: {source}", path.display())]
-    File {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error("cannot draw {}: {reason}", path.display())]
-    Plot { path: PathBuf, reason: String },
-    #[error("cannot print the results: {0}")]
-    Print(std::io::Error),
-    #[error("setting {abscissa} of {experiment}: its markers leave the pose open")]
-    NoBound {
-        experiment: &'static str,
-        abscissa: f64,
-    },
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), ReproduceError> {

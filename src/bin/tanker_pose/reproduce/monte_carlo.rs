@@ -6,7 +6,7 @@ use tanker_pose::simulation::{
     Experiment, Method, PaperBound, Setting, Solver, Summary, paper_bound, trial_generator,
 };
 
-use super::ReproduceError;
+use super::error::ReproduceError;
 
 /// Trials between two movements of the progress bar.
 const TRIALS_A_TICK: u32 = 100;

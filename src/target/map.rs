@@ -1,0 +1,182 @@
+//! A checked marker map, and those that come with the program.
+
+use nalgebra::Point3;
+
+use super::check;
+use super::{MapBudget, Marker, MarkerMapError, Tag};
+use crate::yaml::Place;
+
+/// A checked marker map: at least three markers, ids unique, not all on one line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarkerMap {
+    name: String,
+    /// Ascending id; the corners of tags among them.
+    markers: Vec<Marker>,
+    /// Ascending id.
+    tags: Vec<Tag>,
+    budget: MapBudget,
+}
+
+/// Name and text of each map that comes with the program.
+const SHIPPED: [(&str, &str); 2] = [
+    ("paper", include_str!("../../config/tankers/paper.yaml")),
+    ("fin6", include_str!("../../config/tankers/fin6.yaml")),
+];
+
+impl MarkerMap {
+    /// Returns the checked map from markers in any order.
+    ///
+    /// # Errors
+    /// Every variant of [`MarkerMapError`] but those of reading; places name the map, without a line.
+    pub fn new(name: &str, markers: &[Marker]) -> Result<Self, MarkerMapError> {
+        let whole = Place::whole(&format!("marker map `{name}`"));
+        check::check(markers, |_| whole.clone())?;
+        Ok(Self::sorted(
+            name,
+            markers.to_vec(),
+            Vec::new(),
+            MapBudget::default(),
+        ))
+    }
+
+    /// Returns a map that comes with the program, or none if no such map is shipped.
+    #[must_use]
+    pub fn shipped(name: &str) -> Option<Self> {
+        let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name)?;
+        // That each of them passes its checks is a test's promise.
+        Self::from_yaml(text, &format!("config/tankers/{name}.yaml")).ok()
+    }
+
+    /// Returns the names that [`Self::shipped`] knows.
+    pub fn shipped_names() -> impl Iterator<Item = &'static str> {
+        SHIPPED.iter().map(|(name, _)| *name)
+    }
+
+    /// Returns the map's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns all markers, ascending id; the corners of tags are among them.
+    #[must_use]
+    pub fn markers(&self) -> &[Marker] {
+        &self.markers
+    }
+
+    /// Returns what the map and the airframe may have wrong.
+    #[must_use]
+    pub fn budget(&self) -> &MapBudget {
+        &self.budget
+    }
+
+    /// Returns where a marker sits, tanker frame, m; none for an id that the map does not hold.
+    #[must_use]
+    pub fn get(&self, id: u32) -> Option<Point3<f64>> {
+        let index = self
+            .markers
+            .binary_search_by_key(&id, |marker| marker.id)
+            .ok()?;
+        Some(self.markers[index].marker_in_tanker)
+    }
+
+    /// Returns the tag with this id; none if the map holds no such tag.
+    #[must_use]
+    pub fn tag(&self, id: u32) -> Option<&Tag> {
+        let index = self.tags.binary_search_by_key(&id, |tag| tag.id).ok()?;
+        Some(&self.tags[index])
+    }
+
+    /// Returns where a marker sits that is no tag's corner, tanker frame, m.
+    #[must_use]
+    pub fn single(&self, id: u32) -> Option<Point3<f64>> {
+        let is_corner = Tag::id_of_corner(id).is_some_and(|tag| self.tag(tag).is_some());
+        if is_corner { None } else { self.get(id) }
+    }
+
+    pub(super) fn sorted(name: &str, mut markers: Vec<Marker>, mut tags: Vec<Tag>, budget: MapBudget) -> Self {
+        markers.sort_unstable_by_key(|marker| marker.id);
+        tags.sort_unstable_by_key(|tag| tag.id);
+        Self {
+            name: name.to_owned(),
+            markers,
+            tags,
+            budget,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marker(id: u32, x: f64, y: f64, z: f64) -> Marker {
+        Marker {
+            id,
+            marker_in_tanker: Point3::new(x, y, z),
+        }
+    }
+
+    #[test]
+    fn every_shipped_map_passes_its_checks_under_its_own_name() {
+        assert_eq!(
+            MarkerMap::shipped_names().collect::<Vec<_>>(),
+            ["paper", "fin6"]
+        );
+        for name in MarkerMap::shipped_names() {
+            let map = MarkerMap::shipped(name).expect("a shipped map is sound");
+            assert_eq!(map.name(), name);
+            assert_eq!(map.markers().len(), 6);
+        }
+        assert_eq!(MarkerMap::shipped("747"), None);
+    }
+
+    #[test]
+    fn shipped_maps_hold_table_1_and_differ_in_marker_6_only() {
+        let paper = MarkerMap::shipped("paper").expect("shipped");
+        let fin6 = MarkerMap::shipped("fin6").expect("shipped");
+        let table_1 = [
+            marker(1, 3.7, -7.13, 0.7),
+            marker(2, 3.7, 7.13, 0.7),
+            marker(3, 7.79, -2.689, 0.7),
+            marker(4, 7.79, 2.689, 0.7),
+            marker(5, 7.96, 0.0, 3.189),
+            marker(6, 0.0, 0.0, 0.0),
+        ];
+        assert_eq!(paper.markers(), table_1);
+        assert_eq!(fin6.markers()[..5], table_1[..5]);
+        assert_eq!(fin6.get(6), Some(Point3::new(7.96, 0.0, 1.9)));
+    }
+
+    #[test]
+    fn markers_come_in_ascending_id_and_are_found_by_it() {
+        let given = [
+            marker(4_000_000_000, 1.0, 0.0, 0.0),
+            marker(0, 0.0, 1.0, 0.0),
+            marker(7, 0.0, 0.0, 1.0),
+        ];
+        let map = MarkerMap::new("kite", &given).expect("three markers off a line");
+        assert_eq!(
+            map.markers().iter().map(|m| m.id).collect::<Vec<_>>(),
+            [0, 7, 4_000_000_000]
+        );
+        for m in given {
+            assert_eq!(map.get(m.id), Some(m.marker_in_tanker));
+        }
+        assert_eq!(map.get(1), None);
+        assert_eq!(map.get(u32::MAX), None);
+    }
+
+    #[test]
+    fn a_map_made_from_markers_is_checked_like_one_from_a_file() {
+        let error = MarkerMap::new(
+            "stick",
+            &[marker(1, 0.0, 0.0, 0.0), marker(1, 1.0, 0.0, 0.0)],
+        )
+        .expect_err("two markers are too few");
+        assert_eq!(
+            error.to_string(),
+            "marker map `stick`: need at least 3 markers for a pose, got 2"
+        );
+    }
+}
