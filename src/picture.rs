@@ -205,6 +205,7 @@ mod tests {
         let outcome = FrameOutcome {
             result,
             doubtful: None,
+            residuals: Vec::new(),
             used_ids: vec![1, 2],
             rejected_ids: vec![6],
             left_out: LeftOut::default(),

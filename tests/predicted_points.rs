@@ -88,7 +88,7 @@ fn send(pipeline: &mut Pipeline, stamp_ns: i64, detections: Vec<Detection>) -> O
         .process(&DetectionFrame {
             stamp: stamp(stamp_ns),
             frame_id: FRAME_ID.to_owned(),
-            detections,
+            detections: Ok(detections),
         })
         .code()
 }

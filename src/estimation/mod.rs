@@ -237,7 +237,7 @@ pub enum EstimateError {
         need: usize,
     },
     /// A pixel that the lens model cannot turn into a ray.
-    #[error("point {id}: {cause}")]
+    #[error("id {id}: {cause}")]
     NoRay {
         /// Its marker id.
         id: u32,
@@ -258,7 +258,7 @@ pub enum EstimateError {
     },
     /// The best fit puts a marker behind the lens.
     #[error(
-        "expected every marker in front of the camera, but the best fit puts marker {id} at depth {} m",
+        "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m",
         crate::text::digits(*depth_m)
     )]
     BehindCamera {

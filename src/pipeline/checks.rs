@@ -2,15 +2,12 @@
 
 use nalgebra::Point3;
 
-use super::{Detection, Refusal, Stamp};
+use super::refusal::{MAX_SIGMA_PX, MIN_SIGMA_PX, Refusal};
+use super::{Detection, Stamp};
 use crate::camera::{Camera, Pixel};
 use crate::estimation::Observation;
 use crate::text::MAX_NAME_BYTES;
 
-/// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
-pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
-/// px; beyond this a detection says nothing.
-pub(super) const MAX_SIGMA_PX: f64 = 1e3;
 /// px; limit of pixels where the size of the image is not known.
 const MAX_PIXEL: f64 = 1e5;
 

@@ -1,7 +1,5 @@
 //! The constants of `tanker_pose/msg/EstimatorStatus`, for everybody who counts or prints outcomes.
 
-use super::{FrameOutcome, Refusal};
-
 /// What became of a frame, in one word; the number is that of the message's constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
@@ -73,50 +71,6 @@ impl OutcomeCode {
             Self::NotTrusted => "NOT_TRUSTED",
             Self::Ambiguous => "AMBIGUOUS",
         }
-    }
-}
-
-impl Refusal {
-    /// Returns the refusal's code.
-    #[must_use]
-    pub fn code(&self) -> OutcomeCode {
-        match self {
-            Self::NoCameraInfo => OutcomeCode::NoCameraInfo,
-            Self::InvalidCameraInfo(_) => OutcomeCode::InvalidCameraInfo,
-            Self::FrameMismatch { .. } | Self::FrameIdTooLong { .. } | Self::OtherImage { .. } => {
-                OutcomeCode::FrameMismatch
-            }
-            Self::InvalidStamp(_) => OutcomeCode::ZeroStamp,
-            Self::UnknownId { .. }
-            | Self::InvalidId { .. }
-            | Self::UnknownTag { .. }
-            | Self::WrongFamily { .. } => OutcomeCode::UnknownId,
-            Self::DuplicateId { .. } => OutcomeCode::DuplicateId,
-            Self::NotFinite { .. } => OutcomeCode::NotFinite,
-            Self::InvalidSigma { .. } => OutcomeCode::InvalidSigma,
-            Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
-            Self::TooFewPoints { .. } | Self::TooFewPrecisePoints { .. } => {
-                OutcomeCode::TooFewPoints
-            }
-            Self::DegenerateGeometry { .. } | Self::TooUncertain { .. } => {
-                OutcomeCode::DegenerateGeometry
-            }
-            Self::NoConvergence { .. } => OutcomeCode::NoConvergence,
-            Self::BehindCamera { .. } => OutcomeCode::BehindCamera,
-            Self::NotTrusted { .. } => OutcomeCode::NotTrusted,
-            Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
-        }
-    }
-}
-
-impl FrameOutcome {
-    /// Returns the outcome's code.
-    #[must_use]
-    pub fn code(&self) -> OutcomeCode {
-        self.result
-            .as_ref()
-            .err()
-            .map_or(OutcomeCode::Ok, Refusal::code)
     }
 }
 

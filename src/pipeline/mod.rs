@@ -12,9 +12,12 @@ mod budget;
 mod checks;
 mod code;
 mod edge;
+mod frame;
+mod frame_track;
 mod next_image;
 mod outcome;
 mod predict;
+mod refusal;
 mod residuals;
 mod stamp;
 mod track;
@@ -32,38 +35,16 @@ pub use budget::{budget_in_words, error_budget};
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use edge::{ImageEdges, LeftOut};
+pub use frame::{Detection, DetectionFrame};
+pub use frame_track::{FrameTrack, TrackCode};
 pub use next_image::NextImage;
-pub use outcome::{FrameOutcome, Refusal};
+pub use outcome::FrameOutcome;
 pub use predict::PredictedPoint;
-use predict::Predictor;
+use predict::{Predictor, View};
+pub use refusal::Refusal;
 pub use residuals::MarkerResidual;
 pub use stamp::Stamp;
 use track::Tracker;
-pub use track::{FrameTrack, TrackCode};
-
-/// One beacon found in an image, before any check.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Detection {
-    /// Marker id in the tanker's marker map.
-    pub id: u32,
-    /// Column of the centre, px; the centre of the top-left pixel is (0, 0).
-    pub u_px: f64,
-    /// Row of the centre, px.
-    pub v_px: f64,
-    /// Standard deviation of column and of row, px; 0 where the detector does not know it.
-    pub sigma_px: f64,
-}
-
-/// All detections of one image, before any check.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DetectionFrame {
-    /// When the image was taken.
-    pub stamp: Stamp,
-    /// The camera optical frame that the pixels belong to.
-    pub frame_id: String,
-    /// The detections, in any order.
-    pub detections: Vec<Detection>,
-}
 
 /// What the latest camera info came to.
 #[derive(Debug)]
@@ -190,13 +171,7 @@ impl Pipeline {
 
     /// Returns the outcome of one frame.
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
-        let mut outcome = match self.observations(frame) {
-            Ok((camera, observations, left_out)) => {
-                let previous = self.expected_rotation(frame.stamp);
-                solve(&self.estimator, camera, &observations, previous.as_ref()).without(left_out)
-            }
-            Err(refusal) => FrameOutcome::refused(refusal),
-        };
+        let mut outcome = self.estimate(frame).unwrap_or_else(FrameOutcome::refused);
         self.tracker.follow(frame.stamp, &mut outcome);
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {
@@ -206,13 +181,22 @@ impl Pipeline {
         outcome
     }
 
-    /// Returns the outcome of a frame whose detections could not be read: the header's fault, if it has one, or
-    /// else `refusal`.
-    pub fn refuse(&mut self, stamp: Stamp, frame_id: &str, refusal: Refusal) -> FrameOutcome {
-        let fault = self.camera_for(stamp, frame_id).err();
-        let mut outcome = FrameOutcome::refused(fault.unwrap_or(refusal));
-        self.tracker.follow(stamp, &mut outcome);
-        outcome
+    /// Returns what is estimated of a frame that passes its checks: first the header's, then those of its detections.
+    fn estimate(&self, frame: &DetectionFrame) -> Result<FrameOutcome, Refusal> {
+        let camera = self.camera_for(frame.stamp, &frame.frame_id)?;
+        let detections = frame.detections.as_ref().map_err(Clone::clone)?;
+        let sigma_px = self.settings.pixel_sigma_px;
+        let observations = observe(camera, detections, sigma_px, |id| self.map.get(id))?;
+        let edges = self
+            .camera
+            .as_ref()
+            .and_then(|latched| latched.edges.as_ref());
+        let (observations, left_out) = match edges {
+            Some(edges) => edges.leave_out(observations, self.settings.edge_margin_px),
+            None => (observations, LeftOut::default()),
+        };
+        let previous = self.expected_rotation(frame.stamp);
+        Ok(solve(&self.estimator, camera, &observations, previous.as_ref()).without(left_out))
     }
 
     /// Returns where [`Initialisation::Previous`] starts: what the track expects, or else the last attitude.
@@ -231,7 +215,8 @@ impl Pipeline {
     /// Returns the camera of a frame with this header.
     ///
     /// # Errors
-    /// [`Refusal`] when the stamp is none, there is no camera, or not this one: what [`Self::process`] asks first.
+    /// [`Refusal`] if the stamp is invalid, no usable camera is known, or `frame_id` is not its own: what
+    /// [`Self::process`] checks first.
     pub fn camera_for(&self, stamp: Stamp, frame_id: &str) -> Result<&Camera, Refusal> {
         checks::check_stamp(stamp)?;
         checks::check_frame_id_length(frame_id)?;
@@ -244,27 +229,21 @@ impl Pipeline {
         Ok(camera)
     }
 
-    /// Returns the checked observations of a frame, with its camera and what was left out of it.
-    fn observations(
-        &self,
-        frame: &DetectionFrame,
-    ) -> Result<(&Camera, Vec<Observation>, LeftOut), Refusal> {
-        let camera = self.camera_for(frame.stamp, &frame.frame_id)?;
-        let observations = observe(
-            camera,
-            &frame.detections,
-            self.settings.pixel_sigma_px,
-            |id| self.map.get(id),
-        )?;
-        let edges = self
-            .camera
-            .as_ref()
-            .and_then(|latched| latched.edges.as_ref());
-        let (observations, left_out) = match edges {
-            Some(edges) => edges.leave_out(observations, self.settings.edge_margin_px),
-            None => (observations, LeftOut::default()),
+    /// Returns where the markers are expected in the image of a stamp; empty where nobody knows.
+    ///
+    /// Markers are missing whose sigma exceeds an eighth of the image's shorter side, and such as are out of the
+    /// image by more than four sigmas. None are expected before the last motion's own stamp.
+    ///
+    /// # Errors
+    /// As [`Self::camera_for`].
+    pub fn predict(&self, stamp: Stamp, frame_id: &str) -> Result<Vec<PredictedPoint>, Refusal> {
+        let view = View {
+            camera: self.camera_for(stamp, frame_id)?,
+            markers: self.map.markers(),
+            sigma_px: self.settings.pixel_sigma_px,
         };
-        Ok((camera, observations, left_out))
+        let nominal = &self.settings.estimator.nominal_camera_from_tanker;
+        Ok(self.predictor.points(stamp, nominal, &view))
     }
 }
 
@@ -289,7 +268,8 @@ pub fn solve(
             let causes = has_causes
                 .then(|| estimator.causes(camera, observations, &solution))
                 .flatten();
-            let mut outcome = FrameOutcome::judged(solution, observations, estimator.settings());
+            let settings = estimator.settings();
+            let mut outcome = FrameOutcome::judged(solution, camera, observations, settings);
             outcome.causes = causes;
             outcome
         }

@@ -1,218 +1,11 @@
 //! What becomes of a frame: a trusted pose, or the one reason for none.
 
-use crate::camera::CameraError;
+use super::residuals::{MarkerResidual, residuals};
+use super::{FrameTrack, LeftOut, OutcomeCode, Refusal};
+use crate::camera::Camera;
 use crate::estimation::{
     EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, Solution,
 };
-
-use super::{FrameTrack, LeftOut, Stamp};
-use crate::text::{clip, digits, list, quoted};
-
-/// Why a frame gives no pose. Each says what was expected and what came.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// No camera info yet.
-    #[error("expected a camera_info before the first detections, none has arrived yet")]
-    NoCameraInfo,
-    /// The latest camera info cannot be used.
-    #[error("the latest camera_info cannot be used: {0}")]
-    InvalidCameraInfo(CameraError),
-    /// The detections belong to another camera frame, or do not say to which.
-    #[error("expected detections in the frame of camera_info, '{}', got frame_id '{}'{}", clip(expected), clip(got), if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
-    FrameMismatch {
-        /// `frame_id` of the camera info.
-        expected: String,
-        /// `frame_id` of the detections.
-        got: String,
-    },
-    /// A `frame_id` that would have to be echoed bit for bit, and is too long for that.
-    #[error("expected a frame_id of {limit} bytes at most, got '{}'", clip(got), limit = crate::text::MAX_NAME_BYTES)]
-    FrameIdTooLong {
-        /// `frame_id` of the detections.
-        got: String,
-    },
-    /// The time of the image is missing or malformed.
-    #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
-    InvalidStamp(Stamp),
-    /// An id that is not on the tanker.
-    #[error("expected ids of the marker map, got unknown id {}", list(ids))]
-    UnknownId {
-        /// All such ids of the frame.
-        ids: Vec<u32>,
-    },
-    /// A detection of another message type that does not name one marker.
-    #[error("expected {expected}, got {got}")]
-    InvalidId {
-        /// What would do.
-        expected: &'static str,
-        /// What came.
-        got: String,
-    },
-    /// Tags that are not on the tanker.
-    #[error("expected tags of the marker map, got unknown tag {}", list(ids))]
-    UnknownTag {
-        /// All such ids of the frame.
-        ids: Vec<i32>,
-    },
-    /// A tag of another family.
-    #[error(
-        "expected tag {id} of family {}, got family {}",
-        quoted(expected),
-        quoted(got)
-    )]
-    WrongFamily {
-        /// The tag's id.
-        id: u32,
-        /// Its family in the marker map.
-        expected: String,
-        /// Its family in the detection.
-        got: String,
-    },
-    /// A detection whose own header is not that of its array.
-    #[error("expected detections of one image, got id {id} from frame_id '{}' at {} s {} ns", clip(frame_id), .stamp.sec, .stamp.nanosec)]
-    OtherImage {
-        /// Marker id.
-        id: u32,
-        /// Stamp of the detection.
-        stamp: Stamp,
-        /// `frame_id` of the detection.
-        frame_id: String,
-    },
-    /// One marker seen twice.
-    #[error("expected each id once, got id {id} {count} times")]
-    DuplicateId {
-        /// The first such id.
-        id: u32,
-        /// How often.
-        count: usize,
-    },
-    /// A pixel that is not a number.
-    #[error("expected finite pixels, got ({u_px:?}, {v_px:?}) for id {id}")]
-    NotFinite {
-        /// Marker id.
-        id: u32,
-        /// Column.
-        u_px: f64,
-        /// Row.
-        v_px: f64,
-    },
-    /// A sigma that cannot be one.
-    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px:?} for id {id}", least = super::checks::MIN_SIGMA_PX, most = super::checks::MAX_SIGMA_PX)]
-    InvalidSigma {
-        /// Marker id.
-        id: u32,
-        /// The sigma, px.
-        sigma_px: f64,
-    },
-    /// A pixel where the image or the lens model does not reach.
-    #[error("id {id}: {reason}")]
-    OutsideImage {
-        /// Marker id.
-        id: u32,
-        /// What was expected and what came.
-        reason: String,
-    },
-    /// Fewer points than a pose needs.
-    #[error("expected at least {need} points, got {got}")]
-    TooFewPoints {
-        /// Points at hand.
-        got: usize,
-        /// Points needed.
-        need: usize,
-    },
-    /// Enough points, but too few that are precise enough to check each other.
-    #[error(
-        "expected at least {need} points of similar sigma, got {precise} of {got}: sigmas above five times the third best check nothing"
-    )]
-    TooFewPrecisePoints {
-        /// Points whose sigma is near that of the best.
-        precise: usize,
-        /// Points at hand.
-        got: usize,
-        /// Points needed.
-        need: usize,
-    },
-    /// The attitude is so uncertain that no covariance describes it.
-    #[error(
-        "expected an attitude known to {limit_deg}° or better (1 sigma), got {sigma_deg:.1}°: beyond that a covariance is not honest"
-    )]
-    TooUncertain {
-        /// Largest standard deviation of the attitude, degrees.
-        sigma_deg: f64,
-        /// The largest to publish, degrees.
-        limit_deg: f64,
-    },
-    /// The points cannot fix a pose.
-    #[error("expected points that fix a pose, but {reason}")]
-    DegenerateGeometry {
-        /// What is wrong with them.
-        reason: &'static str,
-    },
-    /// The solver found no minimum.
-    #[error("expected the solver to settle, but it did not within {iterations} iterations")]
-    NoConvergence {
-        /// Iterations of the stage that gave up.
-        iterations: u16,
-    },
-    /// The best fit is a mirror image.
-    #[error(
-        "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m: ids exchanged, a wrong detection, or a wrong camera_mount?",
-        digits(*depth_m)
-    )]
-    BehindCamera {
-        /// Marker id.
-        id: u32,
-        /// Depth, m.
-        depth_m: f64,
-    },
-    /// The residuals are larger than the sigmas promise.
-    #[error(
-        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): {}",
-        digits(*rms_px),
-        what_is_wrong(unclear)
-    )]
-    NotTrusted {
-        /// Of the best fit.
-        chi_squared: f64,
-        /// The largest to trust.
-        limit: f64,
-        /// Of the test.
-        degrees_of_freedom: u16,
-        /// Of the best fit, px.
-        rms_px: f64,
-        /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
-        unclear: Vec<u32>,
-    },
-    /// A second pose fits nearly as well.
-    #[error(
-        "expected one pose to stand out, but another is {ambiguity:.3} times as likely (max_ambiguity {limit})"
-    )]
-    Ambiguous {
-        /// Likelihood of the rival over that of the best.
-        ambiguity: f64,
-        /// The largest to accept.
-        limit: f64,
-    },
-}
-
-impl From<EstimateError> for Refusal {
-    fn from(error: EstimateError) -> Self {
-        match error {
-            EstimateError::TooFewPoints { got, need } => Self::TooFewPoints { got, need },
-            EstimateError::TooFewPrecisePoints { precise, got, need } => {
-                Self::TooFewPrecisePoints { precise, got, need }
-            }
-            EstimateError::NoRay { id, cause } => Self::OutsideImage {
-                id,
-                reason: cause.to_string(),
-            },
-            EstimateError::Degenerate { reason } => Self::DegenerateGeometry { reason },
-            EstimateError::NoConvergence { iterations } => Self::NoConvergence { iterations },
-            EstimateError::BehindCamera { id, depth_m } => Self::BehindCamera { id, depth_m },
-        }
-    }
-}
 
 /// What became of one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -221,6 +14,8 @@ pub struct FrameOutcome {
     pub result: Result<Solution, Refusal>,
     /// The solution behind a refusal that was judged on its numbers: for the status, never to be flown.
     pub doubtful: Option<Solution>,
+    /// How the detections lie about a solution that is not trusted; empty for others.
+    pub residuals: Vec<MarkerResidual>,
     /// Marker ids that the solution rests on.
     pub used_ids: Vec<u32>,
     /// Marker ids left out, as wrong or at the edge of the image.
@@ -242,6 +37,7 @@ impl FrameOutcome {
         Self {
             result: Err(refusal),
             doubtful: None,
+            residuals: Vec::new(),
             used_ids: Vec::new(),
             rejected_ids: Vec::new(),
             left_out: LeftOut::default(),
@@ -253,6 +49,7 @@ impl FrameOutcome {
 
     pub(super) fn judged(
         solution: Solution,
+        camera: &Camera,
         observations: &[Observation],
         settings: &EstimatorSettings,
     ) -> Self {
@@ -261,6 +58,11 @@ impl FrameOutcome {
             .map(|o| o.id)
             .partition(|&id| solution.excluded.contains(id));
         let initialisation = Some(solution.initialisation);
+        let residuals = if solution.is_trusted() {
+            Vec::new()
+        } else {
+            residuals(&solution, camera, observations)
+        };
         let (result, doubtful) = match doubt(&solution, settings) {
             Some(refusal) => (Err(refusal), Some(solution)),
             None => (Ok(solution), None),
@@ -268,6 +70,7 @@ impl FrameOutcome {
         Self {
             result,
             doubtful,
+            residuals,
             used_ids,
             rejected_ids,
             left_out: LeftOut::default(),
@@ -295,19 +98,25 @@ impl FrameOutcome {
         parts.join("; ")
     }
 
+    /// Returns the outcome's code.
+    #[must_use]
+    pub fn code(&self) -> OutcomeCode {
+        self.result
+            .as_ref()
+            .err()
+            .map_or(OutcomeCode::Ok, Refusal::code)
+    }
+
+    /// Returns whether stamp and `frame_id` are those of an image of a camera that is known and can be used.
+    #[must_use]
+    pub fn header_fits(&self) -> bool {
+        !self.result.as_ref().is_err_and(Refusal::is_of_header)
+    }
+
     /// Returns the numbers of the best fit, trusted or not.
     #[must_use]
     pub fn solution(&self) -> Option<&Solution> {
         self.result.as_ref().ok().or(self.doubtful.as_ref())
-    }
-}
-
-fn what_is_wrong(unclear: &[u32]) -> String {
-    match unclear {
-        [a, b] => format!(
-            "a wrong detection, and it is not clear which: without id {a} or without id {b} the rest agrees"
-        ),
-        _ => "a wrong detection or id, or a sigma too small?".to_owned(),
     }
 }
 
@@ -325,9 +134,8 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
         });
     }
     if !solution.covariance.is_valid() {
-        return Some(Refusal::DegenerateGeometry {
-            reason: "from this view they leave a direction of the pose free",
-        });
+        let reason = "from this view they leave a direction of the pose free";
+        return Some(EstimateError::Degenerate { reason }.into());
     }
     // Before the uncertainty, which is what a second pose next to the first makes of the covariance.
     let limit = settings.max_ambiguity;

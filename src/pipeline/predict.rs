@@ -13,10 +13,11 @@ use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Rotation3};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::track::Tracker;
-use super::{Detection, FrameOutcome, Pipeline, Stamp};
+use super::{Detection, FrameOutcome, Stamp};
 use crate::camera::{Camera, Pixel, Ray};
 use crate::estimation::{PRIOR_SIGMA, Solution};
 use crate::geometry::{Motion, PoseCovariance, congruent, left_jacobian_inverse, pose_error, skew};
+use crate::target::Marker;
 use crate::tracking::{Filter, FilterSettings, LastMotion};
 
 /// Of the shorter side of the image: a marker whose sigma is larger may be anywhere in it, since a window of four
@@ -90,6 +91,19 @@ impl Predictor {
         }
     }
 
+    /// Returns where the markers are expected in the image of a stamp; empty where nobody knows.
+    pub(super) fn points(
+        &self,
+        stamp: Stamp,
+        nominal: &Rotation3<f64>,
+        view: &View,
+    ) -> Vec<PredictedPoint> {
+        self.poses(stamp, nominal)
+            .map(|(pose, covariance)| view.points(&pose, &covariance))
+            .find(|points| !points.is_empty())
+            .unwrap_or_default()
+    }
+
     /// Returns the poses that may be expected at a stamp, the likely best first.
     fn poses(
         &self,
@@ -104,6 +118,41 @@ impl Predictor {
     }
 }
 
+/// What is looked at, with what.
+pub(super) struct View<'a> {
+    pub(super) camera: &'a Camera,
+    pub(super) markers: &'a [Marker],
+    /// Standard deviation of detections, px.
+    pub(super) sigma_px: f64,
+}
+
+impl View<'_> {
+    /// Returns where the markers are expected from a pose, without those that are not worth a look.
+    fn points(
+        &self,
+        camera_from_tanker: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> Vec<PredictedPoint> {
+        let point = |marker: &Marker| {
+            let at = &marker.marker_in_tanker.coords;
+            let (pixel, covariance) = project(
+                self.camera,
+                camera_from_tanker,
+                covariance,
+                at,
+                self.sigma_px,
+            )?;
+            let point = PredictedPoint {
+                id: marker.id,
+                pixel,
+                covariance,
+            };
+            is_worth_a_look(self.camera, &point).then_some(point)
+        };
+        self.markers.iter().filter_map(point).collect()
+    }
+}
+
 /// Without a track, the pose of a frame with the velocity and the noise that a track would begin with.
 fn of_pose_alone(stamp: Stamp, solution: &Solution) -> Option<LastMotion> {
     let mut filter = Filter::new(FilterSettings::default()).ok()?;
@@ -113,46 +162,6 @@ fn of_pose_alone(stamp: Stamp, solution: &Solution) -> Option<LastMotion> {
         &solution.covariance,
     );
     filter.last_motion()
-}
-
-impl Pipeline {
-    /// Returns where the markers are expected in the image of a stamp; empty where nobody knows.
-    ///
-    /// Markers are missing whose sigma exceeds an eighth of the image's shorter side, and such as are out of the
-    /// image by more than four sigmas. None are expected before the last motion's own stamp.
-    ///
-    /// # Errors
-    /// As [`Self::camera_for`].
-    pub fn predict(
-        &self,
-        stamp: Stamp,
-        frame_id: &str,
-    ) -> Result<Vec<PredictedPoint>, super::Refusal> {
-        let camera = self.camera_for(stamp, frame_id)?;
-        let nominal = &self.settings.estimator.nominal_camera_from_tanker;
-        let sigma_px = self.settings.pixel_sigma_px;
-        let points = |(pose, covariance)| {
-            let markers = self.map.markers().iter();
-            markers
-                .filter_map(|marker| {
-                    let at = &marker.marker_in_tanker.coords;
-                    let (pixel, covariance) = project(camera, &pose, &covariance, at, sigma_px)?;
-                    let point = PredictedPoint {
-                        id: marker.id,
-                        pixel,
-                        covariance,
-                    };
-                    is_worth_a_look(camera, &point).then_some(point)
-                })
-                .collect::<Vec<_>>()
-        };
-        Ok(self
-            .predictor
-            .poses(stamp, nominal)
-            .map(points)
-            .find(|points| !points.is_empty())
-            .unwrap_or_default())
-    }
 }
 
 /// Returns a predicted pose held against the nominal attitude, and its covariance.

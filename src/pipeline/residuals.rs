@@ -2,7 +2,8 @@
 
 use nalgebra::Vector2;
 
-use super::{DetectionFrame, FrameOutcome, Pipeline};
+use crate::camera::Camera;
+use crate::estimation::{Observation, Solution};
 
 /// One detection against a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,24 +16,18 @@ pub struct MarkerResidual {
     pub sigma_px: f64,
 }
 
-impl Pipeline {
-    /// Returns the residuals of a frame's detections about its best fit, trusted or not; none without a fit.
-    #[must_use]
-    pub fn residuals(&self, frame: &DetectionFrame, outcome: &FrameOutcome) -> Vec<MarkerResidual> {
-        let (Some(solution), Ok((camera, observations, _))) =
-            (outcome.solution(), self.observations(frame))
-        else {
-            return Vec::new();
-        };
-        observations
-            .iter()
-            .filter_map(|seen| {
-                Some(MarkerResidual {
-                    id: seen.id,
-                    residual_px: solution.residual_px(camera, seen)?,
-                    sigma_px: seen.sigma_px,
-                })
-            })
-            .collect()
-    }
+/// Returns the residuals of observations about a fit, without those that the fit puts where the camera sees nothing.
+pub(super) fn residuals(
+    solution: &Solution,
+    camera: &Camera,
+    observations: &[Observation],
+) -> Vec<MarkerResidual> {
+    let residual = |seen: &Observation| {
+        Some(MarkerResidual {
+            id: seen.id,
+            residual_px: solution.residual_px(camera, seen)?,
+            sigma_px: seen.sigma_px,
+        })
+    };
+    observations.iter().filter_map(residual).collect()
 }

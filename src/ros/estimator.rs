@@ -13,7 +13,7 @@ use super::graph::Graph;
 use super::health::{
     Fault, ImageAge, Second, SystemClock, Watch, both_clocks, fault_of, seconds_between,
 };
-use super::input::{InputMessage, InputReader};
+use super::input::{InputMessage, InputReader, Sighting};
 use super::messages::{
     CameraInfo, DiagnosticArray, EstimatorStatus, Header, MarkerArray, Message, Odometry,
     PoseWithCovarianceStamped, TFMessage, Time,
@@ -25,9 +25,7 @@ use super::understood::say_understood;
 use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
-use crate::pipeline::{
-    Detection, DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Refusal, TrackCode,
-};
+use crate::pipeline::{DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Stamp, TrackCode};
 use crate::refuelling::RefuellingSetup;
 use crate::text::{echoed, quoted};
 use crate::tracking::TrackOutcome;
@@ -200,36 +198,38 @@ impl Estimator {
             self.tally.unanswered += 1;
             return;
         }
-        let sighting = self.reader.read(message);
-        let (frame, outcome) = self.outcome(&sighting.header, sighting.detections);
+        let Sighting {
+            header,
+            detections,
+            ignored_ids,
+        } = self.reader.read(message);
+        let frame = DetectionFrame {
+            stamp: header.stamp.into(),
+            frame_id: header.frame_id.clone(),
+            detections,
+        };
+        let outcome = self.pipeline.process(&frame);
         // A frame whose name is too long for that is refused, so no pose has a cut one.
         let header = Header {
-            frame_id: echoed(sighting.header.frame_id),
-            ..sighting.header
+            frame_id: echoed(header.frame_id),
+            ..header
         };
         let solve_time = begin.elapsed();
 
-        let is_of_camera = self
-            .pipeline
-            .camera_for(frame.stamp, &frame.frame_id)
-            .is_ok();
         let refusal = outcome.result.as_ref().err();
         let fault = refusal.and_then(|refusal| fault_of(refusal, &frame.frame_id));
-        if is_of_camera && fault != Some(Fault::FrameMismatch) {
+        if outcome.header_fits() && fault != Some(Fault::FrameMismatch) {
             self.watch.on_image(header.stamp, begin);
             if let Some(image) = self.age_of(header.stamp) {
                 self.watch.on_age(image, begin);
             }
         }
-        self.watch
-            .on_outcome(&self.pipeline, &frame, &outcome, begin);
+        self.watch.on_outcome(&outcome, begin);
         if let Ok(solution) = &outcome.result {
-            let excluded = &solution.excluded;
-            let ids = frame.detections.iter().map(|seen| seen.id);
             // A marker at the edge of the image was not judged.
-            let ids = ids.filter(|id| !outcome.left_out.ids.contains(id));
-            let markers = ids.map(|id| (id, excluded.contains(id)));
-            self.watch.on_pose(markers, begin);
+            let used = outcome.used_ids.iter().map(|&id| (id, false));
+            let excluded = solution.excluded.ids().map(|id| (id, true));
+            self.watch.on_pose(used.chain(excluded), begin);
             let rotation = &solution.camera_from_tanker.rotation;
             let unexpected = self.watch.on_attitude(rotation, begin);
             self.outputs
@@ -247,9 +247,8 @@ impl Estimator {
             }
         }
         self.publish_odometry(&header, &outcome);
-        let mut status = convert::status(header.clone(), &outcome, solve_time);
-        status.rejected_ids.extend(sighting.ignored_ids);
-        self.take_note(&outcome, &status.message, &frame, solve_time);
+        let status = convert::status(header.clone(), &outcome, &ignored_ids, solve_time);
+        self.take_note(&outcome, &status.message, fault, frame.stamp, solve_time);
         self.outputs.status.publish(status, &mut self.tally);
         if let Some(predicted) = &mut self.outputs.predicted_points {
             predicted.on_detections(&header, &self.pipeline, &mut self.tally);
@@ -263,28 +262,6 @@ impl Estimator {
             let age_s = seconds_between(header.stamp, self.clock.now());
             self.watch.age.take(age_s, end);
         }
-    }
-
-    /// Returns the detections as a frame, and what becomes of it; without detections their refusal.
-    fn outcome(
-        &mut self,
-        header: &Header,
-        detections: Result<Vec<Detection>, Refusal>,
-    ) -> (DetectionFrame, FrameOutcome) {
-        let (detections, refusal) = match detections {
-            Ok(detections) => (detections, None),
-            Err(refusal) => (Vec::new(), Some(refusal)),
-        };
-        let frame = DetectionFrame {
-            stamp: header.stamp.into(),
-            frame_id: header.frame_id.clone(),
-            detections,
-        };
-        let outcome = match refusal {
-            Some(refusal) => self.pipeline.refuse(frame.stamp, &frame.frame_id, refusal),
-            None => self.pipeline.process(&frame),
-        };
-        (frame, outcome)
     }
 
     /// Returns how old an image is by the node's time; none while that stands still for want of `/clock`.
@@ -457,11 +434,13 @@ impl Estimator {
         let Some(output) = &mut self.outputs.markers else {
             return;
         };
-        let picture = self
-            .pipeline
-            .camera_for(frame.stamp, &frame.frame_id)
-            .map(|camera| Picture::new(camera, &self.reader.map, &frame.detections, outcome))
-            .unwrap_or_default();
+        let picture = match self.pipeline.camera() {
+            Some((_, Ok(camera))) if outcome.header_fits() => {
+                let detections = frame.detections.as_deref().unwrap_or_default();
+                Picture::new(camera, &self.reader.map, detections, outcome)
+            }
+            _ => Picture::default(),
+        };
         output.publish(convert::markers(header, &picture), &mut self.tally);
     }
 
@@ -493,7 +472,8 @@ impl Estimator {
         &mut self,
         answer: &FrameOutcome,
         message: &str,
-        frame: &DetectionFrame,
+        fault: Option<Fault>,
+        stamp: Stamp,
         solve_time: Duration,
     ) {
         let outcome = answer.code();
@@ -517,14 +497,13 @@ impl Estimator {
         }
         self.last_refusal = Some(message.to_owned());
         let now = Instant::now();
-        let (sec, nanosec) = (frame.stamp.sec, frame.stamp.nanosec);
+        let Stamp { sec, nanosec } = stamp;
         let words = format!(
             "frames are refused from stamp {sec}.{nanosec:09} on, {}: {message}",
             outcome.name()
         );
         let is_new = self.refusals.fault(outcome, now);
-        let refusal = answer.result.as_ref().err();
-        match refusal.and_then(|refusal| fault_of(refusal, &frame.frame_id)) {
+        match fault {
             Some(fault) => self.watch.on_refusal(fault, &words, now),
             None if is_new => log::warn!("{words}"),
             None => {}

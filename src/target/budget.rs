@@ -9,6 +9,8 @@ use serde_saphyr::Spanned;
 use super::{Marker, MarkerMapError, Tag};
 use crate::yaml::Place;
 
+/// Most ways in which an airframe bends.
+pub const MAX_FLEX_MODES: usize = 4;
 /// Largest standard deviation of a survey, m: beyond it the unit is wrong.
 const MAX_SURVEY_M: f64 = 1.0;
 /// Largest standard deviation of a bent airframe, m.
@@ -108,11 +110,11 @@ pub(super) fn budget(
         }
         modes.push(raw.checked(markers, of_tags, source)?);
     }
-    if modes.len() > crate::target::MAX_FLEX_MODES {
+    if modes.len() > MAX_FLEX_MODES {
         return Err(MarkerMapError::TooManyFlexModes {
             place: Place::at(source, flex[0].name.referenced),
             got: modes.len(),
-            most: crate::target::MAX_FLEX_MODES,
+            most: MAX_FLEX_MODES,
         });
     }
     survey.retain(|_, sigma| *sigma > 0.0);

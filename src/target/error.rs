@@ -3,9 +3,6 @@
 use crate::text::quoted;
 use crate::yaml::{Place, YamlError};
 
-/// Most ways in which an airframe bends.
-pub const MAX_FLEX_MODES: usize = 4;
-
 /// Why a marker map cannot be used; each message begins with the place at fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -94,7 +94,12 @@ impl MarkerMap {
         if is_corner { None } else { self.get(id) }
     }
 
-    pub(super) fn sorted(name: &str, mut markers: Vec<Marker>, mut tags: Vec<Tag>, budget: MapBudget) -> Self {
+    pub(super) fn sorted(
+        name: &str,
+        mut markers: Vec<Marker>,
+        mut tags: Vec<Tag>,
+        budget: MapBudget,
+    ) -> Self {
         markers.sort_unstable_by_key(|marker| marker.id);
         tags.sort_unstable_by_key(|tag| tag.id);
         Self {

@@ -16,8 +16,8 @@ mod marker;
 mod tag;
 mod tag_file;
 
-pub use budget::{Flex, MapBudget};
-pub use error::{MAX_FLEX_MODES, MarkerMapError};
+pub use budget::{Flex, MAX_FLEX_MODES, MapBudget};
+pub use error::MarkerMapError;
 pub use map::MarkerMap;
 pub use marker::Marker;
 pub use tag::Tag;

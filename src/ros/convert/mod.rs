@@ -177,9 +177,14 @@ fn orientation(rotation: &UnitQuaternion<f64>) -> messages::Quaternion {
     }
 }
 
-/// Returns the status message of a frame.
+/// Returns the status message of a frame, of which points with `ignored_ids` were left out before any check.
 #[must_use]
-pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> EstimatorStatus {
+pub fn status(
+    header: Header,
+    frame: &FrameOutcome,
+    ignored_ids: &[u32],
+    solve_time: Duration,
+) -> EstimatorStatus {
     let solution = frame.solution();
     let number = |of: fn(&Solution) -> f64| solution.map_or(f64::NAN, of);
     let count = |of: fn(&Solution) -> u16| solution.map_or(0, of);
@@ -192,7 +197,7 @@ pub fn status(header: Header, frame: &FrameOutcome, solve_time: Duration) -> Est
         outcome: frame.code().number(),
         message: frame.message(),
         used_ids: frame.used_ids.clone(),
-        rejected_ids: frame.rejected_ids.clone(),
+        rejected_ids: [&frame.rejected_ids, ignored_ids].concat(),
         rms_residual: number(|solution| solution.rms_px),
         chi_squared: number(|solution| solution.chi_squared),
         degrees_of_freedom: count(|solution| solution.degrees_of_freedom),

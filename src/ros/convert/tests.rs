@@ -37,6 +37,7 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
     FrameOutcome {
         result,
         doubtful,
+        residuals: Vec::new(),
         used_ids: vec![1, 2],
         rejected_ids: vec![3],
         left_out: LeftOut::default(),
@@ -108,7 +109,7 @@ fn transform_and_pose_say_the_same() {
 #[test]
 fn estimate_gives_ok_without_a_message() {
     let frame = frame(Ok(solution()), None);
-    let status = status(header(), &frame, Duration::new(1, 500));
+    let status = status(header(), &frame, &[], Duration::new(1, 500));
     assert_eq!(
         (status.outcome, status.message.as_str()),
         (OutcomeCode::Ok.number(), "")
@@ -134,9 +135,11 @@ fn refusal_without_a_solution_has_nan_and_a_message() {
     let status = status(
         header(),
         &frame(Err(Refusal::NoCameraInfo), None),
+        &[9],
         Duration::ZERO,
     );
     assert_eq!(status.outcome, OutcomeCode::NoCameraInfo.number());
+    assert_eq!(status.rejected_ids, [3, 9]);
     assert!(!status.message.is_empty());
     assert!(status.rms_residual.is_nan() && status.chi_squared.is_nan());
     assert!(status.ambiguity.is_nan());
@@ -146,6 +149,6 @@ fn refusal_without_a_solution_has_nan_and_a_message() {
 #[test]
 fn refusal_judged_on_numbers_shows_them() {
     let doubtful = frame(Err(Refusal::NoCameraInfo), Some(solution()));
-    let status = status(header(), &doubtful, Duration::ZERO);
+    let status = status(header(), &doubtful, &[], Duration::ZERO);
     assert!((status.chi_squared - 3.0).abs() < f64::EPSILON);
 }

@@ -9,7 +9,7 @@ use super::{
     Attitude, ClockSilence, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge,
     Suspects, Unexpected,
 };
-use crate::pipeline::{DetectionFrame, FrameOutcome, OutcomeCode, Pipeline};
+use crate::pipeline::{FrameOutcome, OutcomeCode};
 use crate::refuelling::ExpectedAttitude;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
@@ -225,13 +225,7 @@ impl Watch {
     }
 
     /// Takes note of how the fit of a frame is judged by its residuals, if it has one.
-    pub fn on_outcome(
-        &mut self,
-        pipeline: &Pipeline,
-        frame: &DetectionFrame,
-        outcome: &FrameOutcome,
-        now: Instant,
-    ) {
+    pub fn on_outcome(&mut self, outcome: &FrameOutcome, now: Instant) {
         let Some(solution) = outcome.solution() else {
             return;
         };
@@ -239,7 +233,7 @@ impl Watch {
             let doubtful = Doubtful {
                 chi_squared: solution.chi_squared,
                 degrees_of_freedom: solution.degrees_of_freedom,
-                residuals: &pipeline.residuals(frame, outcome),
+                residuals: &outcome.residuals,
             };
             self.residuals.take(Some(doubtful), now);
         } else {

@@ -1,0 +1,27 @@
+//! What came of one image.
+
+use super::{Refusal, Stamp};
+
+/// One beacon found in an image, before any check.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// Marker id in the tanker's marker map.
+    pub id: u32,
+    /// Column of the centre, px; the centre of the top-left pixel is (0, 0).
+    pub u_px: f64,
+    /// Row of the centre, px.
+    pub v_px: f64,
+    /// Standard deviation of column and of row, px; 0 where the detector does not know it.
+    pub sigma_px: f64,
+}
+
+/// All detections of one image, before any check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectionFrame {
+    /// When the image was taken.
+    pub stamp: Stamp,
+    /// The camera optical frame that the pixels belong to.
+    pub frame_id: String,
+    /// The detections, in any order; or why they cannot be read.
+    pub detections: Result<Vec<Detection>, Refusal>,
+}

@@ -1,0 +1,230 @@
+//! The reasons for which a frame gives no pose.
+
+use super::{OutcomeCode, Stamp};
+use crate::camera::CameraError;
+use crate::estimation::EstimateError;
+use crate::text::{clip, digits, list, quoted};
+
+/// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
+pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
+/// px; beyond this a detection says nothing.
+pub(super) const MAX_SIGMA_PX: f64 = 1e3;
+
+/// Why a frame gives no pose. Each says what was expected and what came.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// No camera info yet.
+    #[error("expected a camera_info before the first detections, none has arrived yet")]
+    NoCameraInfo,
+    /// The latest camera info cannot be used.
+    #[error("the latest camera_info cannot be used: {0}")]
+    InvalidCameraInfo(CameraError),
+    /// The detections belong to another camera frame, or do not say to which.
+    #[error("expected detections in the frame of camera_info, '{}', got frame_id '{}'{}", clip(expected), clip(got), if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
+    FrameMismatch {
+        /// `frame_id` of the camera info.
+        expected: String,
+        /// `frame_id` of the detections.
+        got: String,
+    },
+    /// A `frame_id` that would have to be echoed bit for bit, and is too long for that.
+    #[error("expected a frame_id of {limit} bytes at most, got '{}'", clip(got), limit = crate::text::MAX_NAME_BYTES)]
+    FrameIdTooLong {
+        /// `frame_id` of the detections.
+        got: String,
+    },
+    /// The time of the image is missing or malformed.
+    #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
+    InvalidStamp(Stamp),
+    /// An id that is not on the tanker.
+    #[error("expected ids of the marker map, got unknown id {}", list(ids))]
+    UnknownId {
+        /// All such ids of the frame.
+        ids: Vec<u32>,
+    },
+    /// A detection of another message type that does not name one marker.
+    #[error("expected {expected}, got {got}")]
+    InvalidId {
+        /// What would do.
+        expected: &'static str,
+        /// What came.
+        got: String,
+    },
+    /// Tags that are not on the tanker.
+    #[error("expected tags of the marker map, got unknown tag {}", list(ids))]
+    UnknownTag {
+        /// All such ids of the frame.
+        ids: Vec<i32>,
+    },
+    /// A tag of another family.
+    #[error(
+        "expected tag {id} of family {}, got family {}",
+        quoted(expected),
+        quoted(got)
+    )]
+    WrongFamily {
+        /// The tag's id.
+        id: u32,
+        /// Its family in the marker map.
+        expected: String,
+        /// Its family in the detection.
+        got: String,
+    },
+    /// A detection whose own header is not that of its array.
+    #[error("expected detections of one image, got id {id} from frame_id '{}' at {} s {} ns", clip(frame_id), .stamp.sec, .stamp.nanosec)]
+    OtherImage {
+        /// Marker id.
+        id: u32,
+        /// Stamp of the detection.
+        stamp: Stamp,
+        /// `frame_id` of the detection.
+        frame_id: String,
+    },
+    /// One marker seen twice.
+    #[error("expected each id once, got id {id} {count} times")]
+    DuplicateId {
+        /// The first such id.
+        id: u32,
+        /// How often.
+        count: usize,
+    },
+    /// A pixel that is not a number.
+    #[error("expected finite pixels, got ({u_px:?}, {v_px:?}) for id {id}")]
+    NotFinite {
+        /// Marker id.
+        id: u32,
+        /// Column.
+        u_px: f64,
+        /// Row.
+        v_px: f64,
+    },
+    /// A sigma that cannot be one.
+    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px:?} for id {id}", least = MIN_SIGMA_PX, most = MAX_SIGMA_PX)]
+    InvalidSigma {
+        /// Marker id.
+        id: u32,
+        /// The sigma, px.
+        sigma_px: f64,
+    },
+    /// A pixel where the image does not reach.
+    #[error("id {id}: {reason}")]
+    OutsideImage {
+        /// Marker id.
+        id: u32,
+        /// What was expected and what came.
+        reason: String,
+    },
+    /// The estimate failed.
+    #[error("{0}{hint}", hint = hint(.0))]
+    Estimate(#[from] EstimateError),
+    /// The attitude is so uncertain that no covariance describes it.
+    #[error(
+        "expected an attitude known to {limit_deg}° or better (1 sigma), got {sigma_deg:.1}°: beyond that a covariance is not honest"
+    )]
+    TooUncertain {
+        /// Largest standard deviation of the attitude, degrees.
+        sigma_deg: f64,
+        /// The largest to publish, degrees.
+        limit_deg: f64,
+    },
+    /// The residuals are larger than the sigmas promise.
+    #[error(
+        "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): {}",
+        digits(*rms_px),
+        what_is_wrong(unclear)
+    )]
+    NotTrusted {
+        /// Of the best fit.
+        chi_squared: f64,
+        /// The largest to trust.
+        limit: f64,
+        /// Of the test.
+        degrees_of_freedom: u16,
+        /// Of the best fit, px.
+        rms_px: f64,
+        /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
+        unclear: Vec<u32>,
+    },
+    /// A second pose fits nearly as well.
+    #[error(
+        "expected one pose to stand out, but another is {ambiguity:.3} times as likely (max_ambiguity {limit})"
+    )]
+    Ambiguous {
+        /// Likelihood of the rival over that of the best.
+        ambiguity: f64,
+        /// The largest to accept.
+        limit: f64,
+    },
+}
+
+impl Refusal {
+    /// Returns the refusal's code.
+    #[must_use]
+    pub fn code(&self) -> OutcomeCode {
+        match self {
+            Self::NoCameraInfo => OutcomeCode::NoCameraInfo,
+            Self::InvalidCameraInfo(_) => OutcomeCode::InvalidCameraInfo,
+            Self::FrameMismatch { .. } | Self::FrameIdTooLong { .. } | Self::OtherImage { .. } => {
+                OutcomeCode::FrameMismatch
+            }
+            Self::InvalidStamp(_) => OutcomeCode::ZeroStamp,
+            Self::UnknownId { .. }
+            | Self::InvalidId { .. }
+            | Self::UnknownTag { .. }
+            | Self::WrongFamily { .. } => OutcomeCode::UnknownId,
+            Self::DuplicateId { .. } => OutcomeCode::DuplicateId,
+            Self::NotFinite { .. } => OutcomeCode::NotFinite,
+            Self::InvalidSigma { .. } => OutcomeCode::InvalidSigma,
+            Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
+            Self::Estimate(error) => code_of(error),
+            Self::TooUncertain { .. } => OutcomeCode::DegenerateGeometry,
+            Self::NotTrusted { .. } => OutcomeCode::NotTrusted,
+            Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
+        }
+    }
+    /// Returns whether it is for what the header says, or for want of a camera that it could fit.
+    #[must_use]
+    pub fn is_of_header(&self) -> bool {
+        matches!(
+            self,
+            Self::NoCameraInfo
+                | Self::InvalidCameraInfo(_)
+                | Self::FrameMismatch { .. }
+                | Self::FrameIdTooLong { .. }
+                | Self::InvalidStamp(_)
+        )
+    }
+}
+
+/// The code of an estimate that failed.
+const fn code_of(error: &EstimateError) -> OutcomeCode {
+    match error {
+        EstimateError::TooFewPoints { .. } | EstimateError::TooFewPrecisePoints { .. } => {
+            OutcomeCode::TooFewPoints
+        }
+        EstimateError::NoRay { .. } => OutcomeCode::OutsideImage,
+        EstimateError::Degenerate { .. } => OutcomeCode::DegenerateGeometry,
+        EstimateError::NoConvergence { .. } => OutcomeCode::NoConvergence,
+        EstimateError::BehindCamera { .. } => OutcomeCode::BehindCamera,
+    }
+}
+
+/// What may be wrong around an estimator that failed.
+const fn hint(error: &EstimateError) -> &'static str {
+    match error {
+        EstimateError::BehindCamera { .. } => {
+            ": ids exchanged, a wrong detection, or a wrong camera_mount?"
+        }
+        _ => "",
+    }
+}
+
+fn what_is_wrong(unclear: &[u32]) -> String {
+    match unclear {
+        [a, b] => format!(
+            "a wrong detection, and it is not clear which: without id {a} or without id {b} the rest agrees"
+        ),
+        _ => "a wrong detection or id, or a sigma too small?".to_owned(),
+    }
+}
