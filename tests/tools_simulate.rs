@@ -234,6 +234,10 @@ fn wrong_options_are_refused_by_name() {
             "/nonexistent.yaml",
         ),
         (
+            &["simulate", "--draw-tanker"],
+            "expected a marker map with `sigma` or `flex`",
+        ),
+        (
             &["simulate", "--camera", "/nonexistent.yaml"],
             "/nonexistent.yaml",
         ),

@@ -284,6 +284,17 @@ markers:
     }
 
     #[test]
+    fn the_example_that_comes_with_the_program_has_a_budget() {
+        let text = include_str!("../../config/tankers/budget_example.yaml");
+        let map = MarkerMap::from_yaml(text, "budget_example.yaml").expect("a sound example");
+        let budget = map.budget();
+        assert_eq!(budget.survey_sigma_m.len(), 8);
+        assert_eq!(budget.survey_sigma_m[4], (5, 0.02));
+        assert_eq!(budget.flex.len(), 1);
+        assert_eq!(budget.flex[0].shape.len(), 6);
+    }
+
+    #[test]
     fn every_slip_is_refused_at_its_line() {
         let flex =
             |sigma: &str, rest: &str| format!("flex:\n  - name: wing\n    sigma: {sigma}\n{rest}");

@@ -61,7 +61,7 @@ pub struct Arguments {
 
 /// Runs the demo to its end, or until SIGINT or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
-    let (approach, camera_info) = arguments.approach.read()?;
+    let (approach, camera_info) = arguments.approach.read(false)?;
     let map = arguments.approach.map()?;
     check_marker_count(&map)?;
     let environment = domain::environment(arguments.domain_id)?;

@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tanker_pose::camera::{Camera, CameraError, CameraInfo};
+use tanker_pose::config::CalibrationSigmas;
+use tanker_pose::estimation::ErrorBudget;
+use tanker_pose::pipeline::error_budget;
 use tanker_pose::simulation::{Approach, ApproachSettings};
 use tanker_pose::target::MarkerMap;
 
@@ -41,7 +44,7 @@ pub struct ApproachOptions {
     /// Amplitude of roll, pitch and yaw relative to the receiver, degrees
     #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = between(0.0, 180.0))]
     attitude_deg: f64,
-    /// Seed of noise, motion and faults
+    /// Seed of noise, motion, faults and tanker
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }
@@ -55,13 +58,20 @@ pub enum ApproachError {
     Calibration(#[from] CalibrationError),
     #[error("cannot use the camera's calibration: {0}")]
     Camera(#[from] CameraError),
+    #[error(
+        "expected a marker map with `sigma` or `flex` to draw the tanker from, and {name} has neither"
+    )]
+    ExactMap { name: String },
     #[error("expected at least one frame, but {duration_s} s at {rate_hz} Hz have none")]
     NoFrame { duration_s: f64, rate_hz: f64 },
 }
 
 impl ApproachOptions {
     /// Returns the approach, and the camera info that goes with it.
-    pub fn read(&self) -> Result<(Approach, CameraInfo), ApproachError> {
+    ///
+    /// # Inputs
+    /// * `draw_tanker`: whether markers and airframe differ from the map, as its `sigma` and `flex` say.
+    pub fn read(&self, draw_tanker: bool) -> Result<(Approach, CameraInfo), ApproachError> {
         let info = match &self.camera {
             None => {
                 CameraInfo::from_yaml(PAPER_CAMERA, "paper.yaml")
@@ -70,11 +80,13 @@ impl ApproachOptions {
             }
             Some(path) => options::calibration(path)?,
         };
-        let approach = Approach::new(
-            self.settings(),
-            Camera::from_info(&info, false)?,
-            self.map()?,
-        );
+        let map = self.map()?;
+        let budget = self.budget(&map, draw_tanker)?;
+        let camera = Camera::from_info(&info, false)?;
+        let mut approach = Approach::new(self.settings(), camera, map);
+        if let Some(budget) = budget {
+            approach = approach.in_a_world_of(&budget);
+        }
         if approach.frame_count() == 0 {
             return Err(ApproachError::NoFrame {
                 duration_s: self.duration_s,
@@ -87,6 +99,24 @@ impl ApproachOptions {
     /// Returns the tanker's beacons.
     pub fn map(&self) -> Result<MarkerMap, ApproachError> {
         options::marker_map(&self.marker_map).map_err(ApproachError::MarkerMap)
+    }
+
+    /// Returns what the tanker is drawn from, if it is.
+    fn budget(
+        &self,
+        map: &MarkerMap,
+        draw_tanker: bool,
+    ) -> Result<Option<ErrorBudget>, ApproachError> {
+        if !draw_tanker {
+            return Ok(None);
+        }
+        if map.budget().is_exact() {
+            return Err(ApproachError::ExactMap {
+                name: self.marker_map.clone(),
+            });
+        }
+        let calibration = CalibrationSigmas::default();
+        Ok(Some(error_budget(map.budget(), &calibration)))
     }
 
     const fn settings(&self) -> ApproachSettings {
