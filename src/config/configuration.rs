@@ -121,7 +121,6 @@ fn filter_settings(values: &Values) -> FilterSettings {
         manoeuvre_factor: values.manoeuvre_factor,
         initial_speed_sigma_mps: values.initial_speed_sigma_mps,
         initial_rate_sigma_dps: values.initial_rate_sigma_dps,
-        position_floor_m: values.position_floor_m,
         gate_probability: values.gate_probability,
         max_gap_s: values.max_gap_s,
         confirm_frames: values.confirm_frames,

@@ -123,8 +123,6 @@ ros2_node::declare_parameters! {
         initial_speed_sigma_mps: f64 = double(3.0, [1e-3, 1e3]).unit("m/s");
         /// standard deviation of the relative rate of turn on each axis when a track begins
         initial_rate_sigma_dps: f64 = double(10.0, [1e-2, 1e3]).unit("deg/s");
-        /// standard deviation that the track adds to each measured position axis: what calibration and map hide
-        position_floor_m: f64 = double(1e-3, [1e-6, 1e2]).unit("m");
         /// probability with which a correct pose is let into the track; one that contradicts the track does not touch it
         gate_probability: f64 = double(0.9999, [0.5, 0.999_999_9]);
         /// so long after the last pose that fitted, the track is dropped; until then odometry is predicted
