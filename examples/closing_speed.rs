@@ -17,11 +17,11 @@ use std::time::{Duration, Instant};
 use async_signal::{Signal, Signals};
 use futures::{StreamExt, select};
 use tanker_pose::ros::arguments::Arguments;
-use tanker_pose::ros::consumers::RECEPTACLE;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::{EstimatorStatus, ReceptacleState};
 use tanker_pose::ros::names::NamesError;
 use tanker_pose::ros::participant::{NodeOptions, RosNode, Subscription, reliable};
+use tanker_pose::ros::topics::RECEPTACLE;
 
 /// So long without a message something is missing.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -43,8 +43,8 @@ fn line(message: &ReceptacleState) -> String {
 
 /// Returns why nothing comes, as far as the graph shows it.
 fn missing(node: &RosNode, domain_id: u16) -> Result<String, NamesError> {
-    let topic = node.names().topic(RECEPTACLE)?;
-    let why = if node.publisher_count(RECEPTACLE)? > 0 {
+    let topic = node.names().topic(RECEPTACLE.name)?;
+    let why = if node.publisher_count(RECEPTACLE.name)? > 0 {
         "it has a publisher, so the node has no confirmed track: `tanker_pose watch` says why"
             .to_owned()
     } else if node.domain::<EstimatorStatus>().nodes.is_empty() {
@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         &environment,
         NodeOptions::new().start_parameter_services(false),
     )?;
-    let subscription = node.subscription::<ReceptacleState>(RECEPTACLE, &reliable(10))?;
+    let subscription = node.subscription::<ReceptacleState>(RECEPTACLE.name, &reliable(10))?;
     let printed = smol::block_on(print(&subscription, &mut signals, limit, || {
         missing(&node, environment.domain_id)
     }));

@@ -19,8 +19,8 @@ use tanker_pose::pipeline::OutcomeCode;
 use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::{EstimatorStatus, PoseWithCovarianceStamped};
-use tanker_pose::ros::node::{POSE, STATUS};
 use tanker_pose::ros::participant::{NodeOptions, RosNode, Subscription, reliable};
+use tanker_pose::ros::topics::{POSE, STATUS};
 
 /// Your own limit of the standard deviation of the position, m.
 const LARGEST_SIGMA_M: f64 = 0.5;
@@ -106,8 +106,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut signals = Signals::new([Signal::Int, Signal::Term])?;
     let options = NodeOptions::new().start_parameter_services(false);
     let mut node = RosNode::open("pose_subscriber", &arguments, &environment, options)?;
-    let poses = node.subscription::<PoseWithCovarianceStamped>(POSE, &reliable(10))?;
-    let statuses = node.subscription::<EstimatorStatus>(STATUS, &reliable(10))?;
+    let poses = node.subscription::<PoseWithCovarianceStamped>(POSE.name, &reliable(10))?;
+    let statuses = node.subscription::<EstimatorStatus>(STATUS.name, &reliable(10))?;
     let followed = smol::block_on(follow(&poses, &statuses, &mut signals, limit));
     // Endpoints go before their node, and the node says goodbye.
     drop((poses, statuses));

@@ -7,24 +7,9 @@ use futures::stream::{self, FusedStream};
 use ros2_client::{ReadError, Subscription};
 
 use super::messages::{Imu, VehicleAttitude};
-use super::participant::{EndpointError, QosProfile, RosNode};
+use super::participant::{EndpointError, RosNode};
+use super::topics::Topic;
 use crate::config::AttitudeSource;
-
-/// PX4's attitude.
-pub const VEHICLE_ATTITUDE: &str = "/fmu/out/vehicle_attitude";
-/// MAVROS's attitude.
-pub const IMU: &str = "/mavros/imu/data";
-
-impl AttitudeSource {
-    /// Returns the name of its topic.
-    #[must_use]
-    pub const fn topic(self) -> &'static str {
-        match self {
-            Self::Px4 => VEHICLE_ATTITUDE,
-            Self::Imu => IMU,
-        }
-    }
-}
 
 /// One sample, as a flight stack sends it.
 #[derive(Debug)]
@@ -54,15 +39,14 @@ impl AttitudeSubscription {
     ///
     /// # Errors
     /// [`EndpointError`] when the name is malformed or the middleware refuses.
-    pub fn open(
-        ros: &mut RosNode,
-        source: Option<AttitudeSource>,
-        qos: &QosProfile,
-    ) -> Result<Self, EndpointError> {
+    pub fn open(ros: &mut RosNode, source: Option<AttitudeSource>) -> Result<Self, EndpointError> {
+        let Some(source) = source else {
+            return Ok(Self::None);
+        };
+        let Topic { name, qos, .. } = source.topic();
         Ok(match source {
-            None => Self::None,
-            Some(source @ AttitudeSource::Px4) => Self::Px4(ros.subscription(source.topic(), qos)?),
-            Some(source @ AttitudeSource::Imu) => Self::Imu(ros.subscription(source.topic(), qos)?),
+            AttitudeSource::Px4 => Self::Px4(ros.subscription(name, &qos)?),
+            AttitudeSource::Imu => Self::Imu(ros.subscription(name, &qos)?),
         })
     }
 

@@ -9,26 +9,11 @@ use ros2_client::{ReadError, Subscription};
 
 use super::convert;
 use super::messages::{AprilTagDetectionArray, Detection2DArray, FeaturePointArray, Header};
-use super::participant::{EndpointError, QosProfile, RosNode};
+use super::participant::{EndpointError, RosNode};
+use super::topics::Topic;
 use crate::config::Input;
 use crate::pipeline::{Detection, Refusal};
 use crate::target::MarkerMap;
-
-/// Input: the detections of an image, in our own message.
-pub const FEATURE_POINTS: &str = "feature_points";
-/// Input: the detections of an image, in those of others.
-pub const DETECTIONS: &str = "detections";
-
-impl Input {
-    /// Returns the name of its topic.
-    #[must_use]
-    pub const fn topic(self) -> &'static str {
-        match self {
-            Self::FeaturePoints => FEATURE_POINTS,
-            Self::Detections | Self::AprilTags => DETECTIONS,
-        }
-    }
-}
 
 /// The detections of an image, as one of the detectors publishes them.
 #[derive(Debug)]
@@ -59,12 +44,12 @@ impl InputSubscription {
     ///
     /// # Errors
     /// [`EndpointError`] when the name is malformed or the middleware refuses.
-    pub fn open(ros: &mut RosNode, input: Input, qos: &QosProfile) -> Result<Self, EndpointError> {
-        let topic = input.topic();
+    pub fn open(ros: &mut RosNode, input: Input) -> Result<Self, EndpointError> {
+        let Topic { name, qos, .. } = input.topic();
         Ok(match input {
-            Input::FeaturePoints => Self::FeaturePoints(ros.subscription(topic, qos)?),
-            Input::Detections => Self::Detections(ros.subscription(topic, qos)?),
-            Input::AprilTags => Self::AprilTags(ros.subscription(topic, qos)?),
+            Input::FeaturePoints => Self::FeaturePoints(ros.subscription(name, &qos)?),
+            Input::Detections => Self::Detections(ros.subscription(name, &qos)?),
+            Input::AprilTags => Self::AprilTags(ros.subscription(name, &qos)?),
         })
     }
 

@@ -1,11 +1,14 @@
 //! The node and its graph: the only floor that knows ros2-client, files, clocks and signals.
 //!
 //! ```text
+//! topics                             the one table of the node's topics
 //! messages, convert, input           the wire <-> plain types
-//! health                             faults around the node, said and shown
-//! consumers, attitude                what refuelling and flight stacks are told, by the receiver's attitude
+//! output, outputs, inputs            what the node publishes on and listens to, opened from the table
+//! files, error                       the files that parameters name; why the node cannot start
+//! health, understood, diagnostics    faults around the node, said and shown
+//! consumers, attitude                messages for refuelling and flight stacks, by the receiver's attitude
 //! predicted_points, reset            where detectors may look in the next image; `~/reset`
-//! estimator, diagnostics             one message's work, and the node's health once a second
+//! monitor, handler                   the node's health once a second; one message's work
 //! node, serve                        all of it together, until a signal or a tool ends it
 //! ```
 //!
@@ -17,16 +20,23 @@ pub mod attitude;
 pub mod consumers;
 pub mod convert;
 pub mod diagnostics;
-pub mod estimator;
+mod error;
+mod files;
+mod handler;
 pub mod health;
 pub mod input;
+mod inputs;
 pub mod messages;
+mod monitor;
 pub mod node;
+pub mod output;
+mod outputs;
 pub mod predicted_points;
 pub mod reset;
 mod serve;
 #[cfg(test)]
 mod tests;
+pub mod topics;
 mod understood;
 
 pub use ros2_node::{

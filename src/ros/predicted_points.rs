@@ -2,8 +2,8 @@
 
 use super::convert::feature_points_message;
 use super::diagnostics::Tally;
-use super::estimator::Output;
 use super::messages::{FeaturePointArray, Header};
+use super::output::Output;
 use crate::pipeline::{Detection, NextImage, Pipeline, PredictedPoint, Stamp};
 
 /// The output with the stamps that it has seen.

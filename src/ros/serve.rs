@@ -1,4 +1,4 @@
-//! The node's loop: messages to the estimator, changed parameters, and, if the node is managed, its transitions.
+//! The node's loop: messages to their handler, changed parameters, and, if the node is managed, its transitions.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -6,19 +6,27 @@ use std::time::{Duration, Instant};
 use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 
 use super::clock::{NodeClock, SimTime};
-use super::consumers::refuelling_setup;
 use super::environment::Environment;
-use super::estimator::{Estimator, Outputs};
+use super::error::NodeError;
+use super::files::Files;
+use super::handler::Handler;
+use super::health::Watch;
+use super::input::InputReader;
+use super::inputs::Inputs;
 use super::lifecycle::{Lifecycle, Request, State, WorkResult};
+use super::monitor::Monitor;
+use super::names::NamesError;
 use super::newest::Newest;
-use super::node::{
-    ATTITUDE, CAMERA_INFO, Inputs, NodeError, estimator, introduce, marker_map, open_topics,
-};
+use super::outputs::Outputs;
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
+use super::topics::{self, ATTITUDE};
 use crate::config::Configuration;
-use crate::refuelling::RefuellingSetup;
+use crate::pipeline::Pipeline;
 use crate::target::MarkerMap;
+use crate::text;
+
+const CAMERA_INFO: &str = topics::CAMERA_INFO.name;
 
 /// How often the loop looks whether it could run at all.
 const BEAT: Duration = Duration::from_millis(100);
@@ -32,8 +40,8 @@ enum Work {
     Closed,
     /// Nothing, though the topics are open: peers do not notice that single endpoints have gone, so these stay.
     Idle(Box<Outputs>),
-    /// The estimator.
-    Ready(Box<Estimator>),
+    /// What handles the messages.
+    Ready(Box<Handler>),
 }
 
 /// What the node's loop works with.
@@ -85,10 +93,9 @@ impl<'a> Server<'a> {
     pub(super) fn start(
         &mut self,
         configuration: &Configuration,
-        map: MarkerMap,
-        setup: Option<RefuellingSetup>,
+        files: Files,
     ) -> Result<(), EndpointError> {
-        self.configure(configuration, map, setup)?;
+        self.configure(configuration, files)?;
         self.activate(true);
         Ok(())
     }
@@ -126,7 +133,7 @@ impl<'a> Server<'a> {
                 () = stop => return Ok(()),
                 _ = seconds.select_next_some() => self.check_middleware()?,
                 () = changes.select_next_some() => self.on_change(),
-                () = resets.select_next_some() => self.with(Estimator::on_reset),
+                () = resets.select_next_some() => self.with(Handler::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
             }
         };
@@ -158,15 +165,15 @@ impl<'a> Server<'a> {
                     last_beat = Instant::now();
                 }
                 () = changes.select_next_some() => self.on_change(),
-                () = resets.select_next_some() => self.with(Estimator::on_reset),
+                () = resets.select_next_some() => self.with(Handler::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
-                sample = camera_infos.select_next_some() => self.with(|estimator| match &sample {
-                    Ok((message, _)) => estimator.on_camera_info(message),
-                    Err(error) => estimator.on_undecodable(CAMERA_INFO, error),
+                sample = camera_infos.select_next_some() => self.with(|handler| match &sample {
+                    Ok((message, _)) => handler.on_camera_info(message),
+                    Err(error) => handler.on_undecodable(CAMERA_INFO, error),
                 }),
-                sample = attitudes.select_next_some() => self.with(|estimator| match sample {
-                    Ok(message) => estimator.on_attitude(&message),
-                    Err(error) => estimator.on_undecodable(ATTITUDE, &error),
+                sample = attitudes.select_next_some() => self.with(|handler| match sample {
+                    Ok(message) => handler.on_attitude(&message),
+                    Err(error) => handler.on_undecodable(ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
                     self.check_middleware()?;
@@ -174,13 +181,13 @@ impl<'a> Server<'a> {
                     let graph = self.ros.graph();
                     for (topic, lost) in &lost {
                         let count = lost.take();
-                        self.with(|estimator| estimator.on_lost(topic, count));
+                        self.with(|handler| handler.on_lost(topic, count));
                     }
-                    self.with(|estimator| estimator.on_second(publishers, &graph, Instant::now()));
+                    self.with(|handler| handler.on_second(publishers, &graph, Instant::now()));
                 },
-                sample = detections.select_next_some() => self.with(|estimator| match sample {
-                    Ok(message) => estimator.on_detections(message),
-                    Err(error) => estimator.on_undecodable(topic, &error),
+                sample = detections.select_next_some() => self.with(|handler| match sample {
+                    Ok(message) => handler.on_detections(message),
+                    Err(error) => handler.on_undecodable(topic, &error),
                 }),
             }
         }
@@ -203,9 +210,9 @@ impl<'a> Server<'a> {
         }
     }
 
-    fn with(&mut self, act: impl FnOnce(&mut Estimator)) {
-        if let Work::Ready(estimator) = &mut self.work {
-            act(estimator);
+    fn with(&mut self, act: impl FnOnce(&mut Handler)) {
+        if let Work::Ready(handler) = &mut self.work {
+            act(handler);
         }
     }
 
@@ -214,7 +221,7 @@ impl<'a> Server<'a> {
         if let Err(error) = self.follow_clock(configuration.use_sim_time) {
             log::error!("use_sim_time has no effect: {error}");
         }
-        self.with(|estimator| estimator.on_configuration(configuration));
+        self.with(|handler| handler.on_configuration(configuration));
     }
 
     fn on_request(&mut self, request: &Request) {
@@ -238,16 +245,14 @@ impl<'a> Server<'a> {
 
     fn configure_as_asked(&mut self) -> WorkResult {
         let configuration = Configuration::from(&self.parameters.snapshot());
-        let prepared = marker_map(&configuration.marker_map)
-            .and_then(|map| Ok((map, refuelling_setup(&configuration.consumers)?)));
-        let (map, setup) = match prepared {
-            Ok(prepared) => prepared,
+        let files = match Files::read(&configuration) {
+            Ok(files) => files,
             Err(error) => {
                 log::error!("cannot be configured: {error}");
                 return WorkResult::Failure;
             }
         };
-        match self.configure(&configuration, map, setup) {
+        match self.configure(&configuration, files) {
             Ok(()) => WorkResult::Success,
             Err(error) => {
                 log::error!("cannot be configured: {}", NodeError::from(error));
@@ -259,38 +264,73 @@ impl<'a> Server<'a> {
     fn configure(
         &mut self,
         configuration: &Configuration,
-        map: MarkerMap,
-        setup: Option<RefuellingSetup>,
+        files: Files,
     ) -> Result<(), EndpointError> {
         self.clean_up();
         let outputs = match std::mem::replace(&mut self.work, Work::Closed) {
             Work::Idle(mut outputs) => {
-                outputs.configure(configuration, setup);
+                outputs.configure(configuration, files.setup);
                 *outputs
             }
             Work::Closed | Work::Ready(_) => {
-                let (inputs, outputs) = open_topics(self.ros, configuration, setup)?;
-                self.inputs = Some(inputs);
+                let outputs = Outputs::open(self.ros, configuration, files.setup)?;
+                // Inputs last: what arrives can be answered.
+                self.inputs = Some(Inputs::open(self.ros, configuration)?);
                 outputs
             }
         };
-        let map = Arc::new(map);
-        introduce(self.ros, self.environment, &map, configuration);
-        let mut estimator = estimator(self.ros, configuration, &map, outputs, &self.clock)?;
-        estimator.understand(configuration);
-        self.work = Work::Ready(Box::new(estimator));
+        self.introduce(configuration, &files.map);
+        let mut handler = self.handler(configuration, files.map, outputs)?;
+        handler.understand(configuration);
+        self.work = Work::Ready(Box::new(handler));
         Ok(())
     }
 
+    fn introduce(&self, configuration: &Configuration, map: &MarkerMap) {
+        let names = self.ros.names();
+        log::info!(
+            "{} in domain {}, marker map {} with {} markers",
+            names.fully_qualified(),
+            self.environment.domain_id,
+            text::quoted(map.name()),
+            map.markers().len(),
+        );
+        log::info!("{}", topics::introduction(names, configuration));
+    }
+
+    /// Returns what handles the messages, for this configuration and map.
+    fn handler(
+        &self,
+        configuration: &Configuration,
+        map: MarkerMap,
+        outputs: Outputs,
+    ) -> Result<Handler, NamesError> {
+        let map = Arc::new(map);
+        let reader = InputReader {
+            input: configuration.input,
+            map: Arc::clone(&map),
+            max_hamming: configuration.max_hamming,
+        };
+        let pipeline = Pipeline::new(configuration.settings.clone(), map);
+        let names = self.ros.names();
+        let watch = Watch::new(
+            names.topic(configuration.input.topic().name)?,
+            names.topic(CAMERA_INFO)?,
+            Instant::now(),
+        );
+        let monitor = Monitor::new(names.base_name(), self.clock.clone(), watch);
+        Ok(Handler::new(pipeline, reader, outputs, monitor))
+    }
+
     fn activate(&mut self, on: bool) {
-        self.with(|estimator| estimator.set_active(on));
+        self.with(|handler| handler.set_active(on));
     }
 
     /// Forgets the map, the camera and all that was counted; what the kept outputs know is replaced when they are
     /// configured again.
     fn clean_up(&mut self) {
         self.work = match std::mem::replace(&mut self.work, Work::Closed) {
-            Work::Ready(estimator) => Work::Idle(Box::new(estimator.into_outputs())),
+            Work::Ready(handler) => Work::Idle(Box::new(handler.into_outputs())),
             other => other,
         };
     }

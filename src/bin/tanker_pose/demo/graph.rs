@@ -8,10 +8,10 @@ use tanker_pose::camera::CameraInfo;
 use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::{EstimatorStatus, PoseWithCovarianceStamped};
-use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS, POSE, STATUS};
 use tanker_pose::ros::participant::{
     NodeOptions, QosProfile, RosNode, Subscription, reliable, within,
 };
+use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS, POSE, STATUS};
 
 use super::error::DemoError;
 use super::flight::{End, Flight};
@@ -42,8 +42,8 @@ impl Graph {
         let mut ros = RosNode::open(NODE_NAME, &arguments, environment, NodeOptions::new())?;
         Ok(Self {
             source: Source::open(&mut ros, camera, FRAME_ID)?,
-            pose: ros.subscription(POSE, &ANSWERS)?,
-            status: ros.subscription(STATUS, &ANSWERS)?,
+            pose: ros.subscription(POSE.name, &ANSWERS)?,
+            status: ros.subscription(STATUS.name, &ANSWERS)?,
             ros,
             domain_id: environment.domain_id,
         })
@@ -135,10 +135,10 @@ impl Graph {
 fn check_alone(ros: &RosNode, domain_id: u16) -> Result<(), DemoError> {
     // The graph does not list the asking node's own publishers.
     for (topic, expected) in [
-        (FEATURE_POINTS, 0),
-        (CAMERA_INFO, 0),
-        (POSE, 1),
-        (STATUS, 1),
+        (FEATURE_POINTS.name, 0),
+        (CAMERA_INFO.name, 0),
+        (POSE.name, 1),
+        (STATUS.name, 1),
     ] {
         if ros.publisher_count(topic)? > expected {
             return Err(DemoError::DomainInUse { domain_id, topic });

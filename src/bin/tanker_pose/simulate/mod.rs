@@ -14,8 +14,8 @@ use futures::future::{Either, select};
 use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::environment::{Environment, EnvironmentError};
 use tanker_pose::ros::names::{NamesError, NodeNames};
-use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
+use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::simulation::Approach;
 
@@ -141,8 +141,8 @@ fn introduce(
         } else {
             ""
         },
-        names.topic(FEATURE_POINTS)?,
-        names.topic(CAMERA_INFO)?,
+        names.topic(FEATURE_POINTS.name)?,
+        names.topic(CAMERA_INFO.name)?,
         names.topic(source::TRUTH)?,
     ));
     Ok(())

@@ -8,10 +8,10 @@ use tanker_pose::camera;
 use tanker_pose::pipeline::{Detection, Stamp};
 use tanker_pose::ros::convert::{camera_info_message, feature_points_message, pose_message};
 use tanker_pose::ros::messages::{CameraInfo, FeaturePointArray, Header, Message, PoseStamped};
-use tanker_pose::ros::node::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::participant::{
     EndpointError, Publisher, QosProfile, RosNode, reliable, within,
 };
+use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
 
 /// The true pose, `geometry_msgs/PoseStamped` in the camera frame.
 pub const TRUTH: &str = "truth";
@@ -59,8 +59,8 @@ impl Source {
     ) -> Result<Self, EndpointError> {
         // Announced in this order: who hears the detections has found what belongs to them.
         let truth = ros.publisher(TRUTH, &OUTPUT)?;
-        let camera_info = ros.publisher(CAMERA_INFO, &OUTPUT)?;
-        let feature_points = ros.publisher(FEATURE_POINTS, &OUTPUT)?;
+        let camera_info = ros.publisher(CAMERA_INFO.name, &OUTPUT)?;
+        let feature_points = ros.publisher(FEATURE_POINTS.name, &OUTPUT)?;
         Ok(Self {
             feature_points,
             camera_info,
@@ -104,9 +104,9 @@ impl Source {
         let camera_info = camera_info_message(header.clone(), &self.info);
         let feature_points = feature_points_message(header.clone(), detections);
         let truth = pose_message(header, truth_camera_from_tanker);
-        let mut dropped = publish(&self.camera_info, camera_info, CAMERA_INFO)?;
+        let mut dropped = publish(&self.camera_info, camera_info, CAMERA_INFO.name)?;
         let at = Instant::now();
-        dropped += publish(&self.feature_points, feature_points, FEATURE_POINTS)?;
+        dropped += publish(&self.feature_points, feature_points, FEATURE_POINTS.name)?;
         dropped += publish(&self.truth, truth, TRUTH)?;
         Ok(Sent { stamp, at, dropped })
     }

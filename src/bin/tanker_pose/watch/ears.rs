@@ -7,11 +7,11 @@ use tanker_pose::ros::messages::{
     DiagnosticArray, EstimatorStatus, Message, Odometry, PoseWithCovarianceStamped,
 };
 use tanker_pose::ros::names::NamesError;
-use tanker_pose::ros::node::{ODOMETRY, POSE, STATUS};
 use tanker_pose::ros::participant::{
     EndpointError, QosProfile, RosNode, Subscription, sensor_data,
 };
 use tanker_pose::ros::running_nodes::{ParticipantId, RunningNode, id};
+use tanker_pose::ros::topics::{ODOMETRY, POSE, STATUS};
 
 use super::heard::Heard;
 
@@ -83,9 +83,9 @@ impl Ears {
     /// Returns ears that listen to nothing yet.
     pub fn new(ros: &RosNode) -> Result<Self, NamesError> {
         Ok(Self {
-            pose: Ear::new(ros, POSE)?,
-            status: Ear::new(ros, STATUS)?,
-            odometry: Ear::new(ros, ODOMETRY)?,
+            pose: Ear::new(ros, POSE.name)?,
+            status: Ear::new(ros, STATUS.name)?,
+            odometry: Ear::new(ros, ODOMETRY.name)?,
             diagnostics: Ear::new(ros, DIAGNOSTICS)?,
         })
     }

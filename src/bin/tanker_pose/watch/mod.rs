@@ -18,8 +18,8 @@ use tanker_pose::ros::arguments::ArgumentError;
 use tanker_pose::ros::environment::{Environment, EnvironmentError};
 use tanker_pose::ros::messages::EstimatorStatus;
 use tanker_pose::ros::names::{NamesError, NodeNames};
-use tanker_pose::ros::node::STATUS;
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode};
+use tanker_pose::ros::topics::STATUS;
 use tanker_pose::ros::{LOG_TARGET, logging};
 
 use crate::options::between;
@@ -138,9 +138,9 @@ impl Watch {
         environment: &Environment,
     ) -> Result<Self, NamesError> {
         let began = Instant::now();
-        let status = ros.names().topic(STATUS)?;
+        let status = ros.names().topic(STATUS.name)?;
         // A namespace or a remap says which node is meant; the plain name says nothing.
-        let status = (status != format!("/{STATUS}")).then_some(status);
+        let status = (status != format!("/{}", STATUS.name)).then_some(status);
         let node = arguments.node.as_deref();
         Ok(Self {
             once: arguments.once,

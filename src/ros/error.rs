@@ -1,0 +1,54 @@
+//! Why the node cannot start, or go on.
+
+use std::path::PathBuf;
+
+use super::consumers::ConsumersError;
+use super::names::NamesError;
+use super::participant::{EndpointError, OpenError};
+use super::start_values::StartParameterError;
+use crate::target::MarkerMapError;
+use crate::text;
+
+/// Why the node could not start.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NodeError {
+    /// The node's name or a remap.
+    #[error(transparent)]
+    Names(#[from] NamesError),
+    /// A parameter or a parameter file.
+    #[error(transparent)]
+    Parameters(#[from] StartParameterError),
+    /// The marker map's file is missing, or not readable, or not text.
+    #[error(
+        "parameter \"marker_map\": cannot read {}: {source} (a path, or one of the shipped maps: paper, fin6)",
+        text::path(path)
+    )]
+    MapUnreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The marker map cannot be used.
+    #[error("parameter \"marker_map\": {0}")]
+    Map(#[from] MarkerMapError),
+    /// An output for refuelling or a flight stack lacks what it needs.
+    #[error(transparent)]
+    Consumers(#[from] ConsumersError),
+    /// Signals cannot be caught.
+    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
+    Signals(std::io::Error),
+    /// The graph cannot be joined.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// A topic cannot be opened.
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    /// Nothing can be heard or said any more.
+    #[error(
+        "the middleware has stopped: its threads do not survive suspending and resuming the process \
+         (SIGSTOP, Ctrl-Z, a debugger); restart the node"
+    )]
+    MiddlewareGone,
+}

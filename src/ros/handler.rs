@@ -1,0 +1,261 @@
+//! What the node does with one message: convert, call the pipeline, convert, publish.
+
+use std::time::Instant;
+
+use super::attitude::AttitudeMessage;
+use super::consumers::Consumers;
+use super::convert;
+use super::graph::Graph;
+use super::health::Unexpected;
+use super::input::{InputMessage, InputReader, Sighting};
+use super::messages::{CameraInfo, Header};
+use super::monitor::{Answer, Monitor, Subject};
+use super::once::SaidOnce;
+use super::outputs::Outputs;
+use super::topics::ATTITUDE;
+use crate::config::Configuration;
+use crate::estimation::Solution;
+use crate::picture::Picture;
+use crate::pipeline::{DetectionFrame, FrameOutcome, Pipeline, TrackCode};
+use crate::text::{echoed, quoted};
+
+/// The pipeline between its messages.
+pub(super) struct Handler {
+    pipeline: Pipeline,
+    reader: InputReader,
+    outputs: Outputs,
+    monitor: Monitor,
+    active: bool,
+    own_child: SaidOnce<()>,
+}
+
+impl Handler {
+    /// Returns a handler that has not seen a message yet and is not active.
+    pub(super) fn new(
+        pipeline: Pipeline,
+        reader: InputReader,
+        outputs: Outputs,
+        monitor: Monitor,
+    ) -> Self {
+        Self {
+            pipeline,
+            reader,
+            outputs,
+            monitor,
+            active: false,
+            own_child: SaidOnce::default(),
+        }
+    }
+
+    /// Begins or ends answers. While it is not active, camera infos still count and detections are only counted.
+    pub(super) const fn set_active(&mut self, on: bool) {
+        self.active = on;
+    }
+
+    /// Returns its outputs, for another handler.
+    pub(super) fn into_outputs(self) -> Outputs {
+        self.outputs
+    }
+
+    /// Takes a camera info.
+    pub(super) fn on_camera_info(&mut self, message: &CameraInfo) {
+        let info = convert::camera_info(message);
+        let result = self.pipeline.set_camera(&info, &message.header.frame_id);
+        self.monitor
+            .on_camera_info(&self.pipeline, result == Ok(true));
+        if let (Some(predicted), true) = (&mut self.outputs.predicted_points, self.active) {
+            predicted.on_camera_info(&message.header, &self.pipeline, &mut self.monitor.tally);
+        }
+    }
+
+    /// Takes the detections of an image; publishes what becomes of them.
+    pub(super) fn on_detections(&mut self, message: InputMessage) {
+        let begin = Instant::now();
+        self.monitor.on_detections(self.input(), begin);
+        if !self.active {
+            self.monitor.tally.unanswered += 1;
+            return;
+        }
+        let Sighting {
+            header,
+            detections,
+            ignored_ids,
+        } = self.reader.read(message);
+        let frame = DetectionFrame {
+            stamp: header.stamp.into(),
+            frame_id: header.frame_id.clone(),
+            detections,
+        };
+        let outcome = self.pipeline.process(&frame);
+        // A frame whose name is too long for that is refused, so no pose has a cut one.
+        let header = Header {
+            frame_id: echoed(header.frame_id),
+            ..header
+        };
+        let solve_time = begin.elapsed();
+        let status = convert::status(header.clone(), &outcome, &ignored_ids, solve_time);
+        let message = status.message.clone();
+        let answer = Answer {
+            frame: &frame,
+            outcome: &outcome,
+            message: &message,
+            solve_time,
+            begin,
+        };
+        let unexpected = self.monitor.on_answer(&answer);
+
+        if let Ok(solution) = &outcome.result {
+            self.publish_pose(&header, solution);
+            self.publish_to_flight_stacks(&header, solution, &outcome, unexpected);
+        }
+        self.publish_odometry(&header, &outcome);
+        self.outputs.status.publish(status, &mut self.monitor.tally);
+        if let Some(predicted) = &mut self.outputs.predicted_points {
+            predicted.on_detections(&header, &self.pipeline, &mut self.monitor.tally);
+        }
+        // Last: they are for people, who don't wait for a millisecond.
+        self.publish_markers(&header, &frame, &outcome);
+        self.monitor.on_published(&answer);
+    }
+
+    /// Takes a sample of the receiver's attitude.
+    pub(super) fn on_attitude(&mut self, message: &AttitudeMessage) {
+        self.monitor.on_decoded(ATTITUDE);
+        if let Some(consumers) = &mut self.outputs.consumers {
+            consumers.on_attitude(message);
+        }
+    }
+
+    /// Takes changed parameters, for the next frame on.
+    pub(super) fn on_configuration(&mut self, configuration: Configuration) {
+        if let Some(consumers) = &mut self.outputs.consumers {
+            consumers.on_configuration(&configuration.consumers);
+        }
+        self.understand(&configuration);
+        self.pipeline.set_settings(configuration.settings);
+        // Whether the image is rectified decides how the camera info is read.
+        self.monitor.on_camera(&self.pipeline);
+    }
+
+    /// Says what a configuration means, if that is new.
+    pub(super) fn understand(&mut self, configuration: &Configuration) {
+        let geometry = self.outputs.consumers.as_ref().map(Consumers::geometry);
+        self.monitor
+            .understand(configuration, &self.reader.map, geometry);
+    }
+
+    /// Forgets the track and the last attitude.
+    pub(super) fn on_reset(&mut self) {
+        self.pipeline.reset();
+        self.monitor.on_reset();
+    }
+
+    /// Takes note of a sample on `topic` that could not be decoded.
+    pub(super) fn on_undecodable(&mut self, topic: &str, error: &ros2_client::ReadError) {
+        self.monitor.on_undecodable(topic, self.input(), error);
+    }
+
+    /// Takes note of samples on `topic` that were passed over because newer ones waited behind them.
+    pub(super) fn on_lost(&mut self, topic: &str, count: u64) {
+        self.monitor.on_lost(topic, count);
+    }
+
+    /// Looks for faults and publishes the diagnostics; `publishers`: of the input, whatever they send.
+    pub(super) fn on_second(&mut self, publishers: usize, graph: &Graph, now: Instant) {
+        let subject = Subject {
+            active: self.active,
+            input: self.input(),
+            marker_map: self.reader.map.name(),
+            publishers,
+        };
+        let mut report = self.monitor.report(&subject, graph, now);
+        if let Some(consumers) = &mut self.outputs.consumers {
+            report
+                .status
+                .push(consumers.diagnostics(self.monitor.node()));
+        }
+        self.outputs
+            .diagnostics
+            .publish(report, &mut self.monitor.tally);
+    }
+
+    fn input(&self) -> &'static str {
+        self.reader.input.topic().name
+    }
+
+    /// Publishes a trusted pose, also as a transform if that is wanted.
+    fn publish_pose(&mut self, header: &Header, solution: &Solution) {
+        let message = convert::pose(header.clone(), solution);
+        self.outputs.pose.publish(message, &mut self.monitor.tally);
+        if self.is_own_child(header) {
+            return;
+        }
+        if let Some(output) = &mut self.outputs.transform {
+            let child = &self.outputs.tanker_frame_id;
+            let message = convert::transform(header.clone(), child, solution);
+            output.publish(message, &mut self.monitor.tally);
+        }
+    }
+
+    fn publish_to_flight_stacks(
+        &mut self,
+        header: &Header,
+        solution: &Solution,
+        outcome: &FrameOutcome,
+        unexpected: Option<Unexpected>,
+    ) {
+        let Some(consumers) = &mut self.outputs.consumers else {
+            return;
+        };
+        let corrected = outcome.track.code() == TrackCode::Updated;
+        let motion = outcome.track.motion.as_ref().filter(|_| corrected);
+        let place = match unexpected {
+            Some(unexpected) => Err(unexpected),
+            None => Ok((solution, motion)),
+        };
+        consumers.on_pose(header, place, &mut self.monitor.tally);
+    }
+
+    /// Publishes the track at the frame's stamp, if there is one.
+    fn publish_odometry(&mut self, header: &Header, outcome: &FrameOutcome) {
+        let Some(motion) = &outcome.track.motion else {
+            return;
+        };
+        if self.is_own_child(header) {
+            return;
+        }
+        let child = &self.outputs.tanker_frame_id;
+        let message = convert::odometry(header.clone(), child, motion);
+        self.outputs
+            .odometry
+            .publish(message, &mut self.monitor.tally);
+    }
+
+    /// Says so when camera and tanker have the same frame: nobody could tell which one is meant.
+    fn is_own_child(&mut self, header: &Header) -> bool {
+        let child = &self.outputs.tanker_frame_id;
+        let is_same = *child == header.frame_id;
+        if is_same && self.own_child.fault((), Instant::now()) {
+            log::warn!(
+                "no odometry, no transform: the camera's frame and tanker_frame_id are both {}",
+                quoted(child)
+            );
+        }
+        is_same
+    }
+
+    /// Publishes what can be drawn; of a refused frame only the camera, if it is that of the frame.
+    fn publish_markers(&mut self, header: &Header, frame: &DetectionFrame, outcome: &FrameOutcome) {
+        let Some(output) = &mut self.outputs.markers else {
+            return;
+        };
+        let picture = match self.pipeline.camera() {
+            Some((_, Ok(camera))) if outcome.header_fits() => {
+                let detections = frame.detections.as_deref().unwrap_or_default();
+                Picture::new(camera, &self.reader.map, detections, outcome)
+            }
+            _ => Picture::default(),
+        };
+        output.publish(convert::markers(header, &picture), &mut self.monitor.tally);
+    }
+}
