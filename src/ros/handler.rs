@@ -113,9 +113,6 @@ impl Handler {
         if let Some(predicted) = &mut self.outputs.predicted_points {
             predicted.on_detections(&header, &self.pipeline, &mut self.monitor.tally);
         }
-        if let Some(answered) = &mut self.outputs.answered {
-            answered.publish(header.clone(), &mut self.monitor.tally);
-        }
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
         self.monitor.on_published(&answer);

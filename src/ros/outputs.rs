@@ -2,8 +2,7 @@
 
 use super::consumers::Consumers;
 use super::messages::{
-    DiagnosticArray, EstimatorStatus, Header, MarkerArray, Odometry, PoseWithCovarianceStamped,
-    TFMessage,
+    DiagnosticArray, EstimatorStatus, MarkerArray, Odometry, PoseWithCovarianceStamped, TFMessage,
 };
 use super::output::Output;
 use super::participant::{EndpointError, RosNode};
@@ -28,8 +27,6 @@ pub struct Outputs {
     pub markers: Option<Output<MarkerArray>>,
     /// Where markers will be, for detectors, if wanted.
     pub predicted_points: Option<PredictedPoints>,
-    /// Headers of answered images, if wanted.
-    pub answered: Option<Output<Header>>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
     /// What refuelling and flight stacks are told, if wanted.
@@ -55,7 +52,6 @@ impl Outputs {
             transform: Output::open_if_wanted(ros, &topics::TRANSFORM, wanted)?,
             markers: Output::open_if_wanted(ros, &topics::MARKERS, wanted)?,
             predicted_points: predicted.map(PredictedPoints::new),
-            answered: Output::open_if_wanted(ros, &topics::ANSWERED, wanted)?,
             diagnostics: Output::open(ros, &topics::HEALTH)?,
             consumers: Consumers::open(ros, wanted, setup)?,
         })

@@ -96,8 +96,6 @@ topics! {
     MARKERS = output("markers", OUTPUT, |node| node.publish_markers);
     /// Output: where markers will be, for detectors.
     PREDICTED_POINTS = output("predicted_points", OUTPUT, |node| node.publish_predicted_points);
-    /// Output: the header of every image that is answered.
-    ANSWERED = output("answered", OUTPUT, |node| node.publish_markers);
     /// Output: where the receptacle is before the probe tip.
     RECEPTACLE = output("receptacle", FLIGHT_STACK, |node| node.consumers.receptacle);
     /// Output: PX4's landing target.
