@@ -148,7 +148,11 @@ impl Estimator {
         if !is_final && self.settings.max_outliers > 0 {
             let of_all = estimate.as_ref().ok();
             match self.leave_out(camera, observations, previous, of_all) {
-                Found::Solution(of_others) => estimate = Ok(of_others),
+                Found::Solution(mut of_others) => {
+                    of_others.chi_squared_of_all =
+                        of_all.map_or(f64::INFINITY, |of_all| of_all.chi_squared);
+                    estimate = Ok(of_others);
+                }
                 Found::Unclear(ids) => {
                     if let Ok(of_all) = &mut estimate {
                         of_all.unclear = ids;
@@ -400,6 +404,7 @@ impl Estimator {
             covariance: honest_covariance(problem, fit, &lever)?,
             rms_px: (fit.squared_residuals_px / residuals as f64).sqrt(),
             chi_squared: fit.chi_squared,
+            chi_squared_of_all: fit.chi_squared,
             degrees_of_freedom: u16::try_from(degrees_of_freedom).unwrap_or(u16::MAX),
             chi_squared_limit: self.limits.limit(degrees_of_freedom),
             iterations: judged.iterations,

@@ -177,6 +177,8 @@ pub struct Solution {
     pub ambiguity: f64,
     /// Points left out as wrong.
     pub excluded: Excluded,
+    /// `chi_squared` of the fit of all points, before any were left out; infinite where they had none.
+    pub chi_squared_of_all: f64,
     /// Two points of which either may be wrong; empty unless one is and it is not clear which.
     pub unclear: Excluded,
 }
@@ -186,6 +188,14 @@ impl Solution {
     #[must_use]
     pub fn residual_px(&self, camera: &Camera, seen: &Observation) -> Option<Vector2<f64>> {
         seen.residual_px(camera, &self.camera_from_tanker)
+    }
+
+    /// Returns chi-squared of the fit of all points with its degrees of freedom, whether or not any were left out.
+    #[must_use]
+    pub fn of_all_points(&self) -> (f64, u16) {
+        let left_out = u16::try_from(self.excluded.ids().count()).unwrap_or(0);
+        let degrees_of_freedom = self.degrees_of_freedom.saturating_add(2 * left_out);
+        (self.chi_squared_of_all, degrees_of_freedom)
     }
 
     /// Returns whether the residuals are as small as the sigmas promise.

@@ -1,7 +1,7 @@
 //! One frame's straight line: detections in, one outcome out, the same for node, tools and tests.
 //!
 //! ```text
-//! stamp -> camera -> frame_id -> every detection -> clear of the edge -> observations -> estimate -> trusted? -> track -> outcome
+//! stamp -> camera -> frame_id -> every detection -> clear of the edge -> observations -> estimate -> trusted? -> no suspect marker? -> track -> outcome
 //! ```
 //!
 //! Knows `estimation`, `tracking`, `camera`, `target`; time enters only as the stamp of a frame. Never reads a
@@ -19,7 +19,10 @@ mod outcome;
 mod predict;
 mod refusal;
 mod residuals;
+mod sigma_watch;
 mod stamp;
+mod suspect_marker;
+mod suspects;
 mod track;
 
 use std::sync::Arc;
@@ -43,7 +46,11 @@ pub use predict::PredictedPoint;
 use predict::{Predictor, View};
 pub use refusal::Refusal;
 pub use residuals::MarkerResidual;
+pub use sigma_watch::SigmaFactor;
+use sigma_watch::SigmaWatch;
 pub use stamp::Stamp;
+pub use suspect_marker::SuspectMarker;
+use suspects::Suspects;
 use track::Tracker;
 
 /// What the latest camera info came to.
@@ -72,7 +79,7 @@ impl LatchedCamera {
 }
 
 /// The estimator with what it remembers between frames: the camera, the last trusted attitude, the track and its last
-/// motion.
+/// motion, and how the last fits agree with sigmas and markers.
 #[derive(Debug)]
 pub struct Pipeline {
     settings: Settings,
@@ -83,6 +90,8 @@ pub struct Pipeline {
     previous: Option<(Rotation3<f64>, Stamp)>,
     tracker: Tracker,
     predictor: Predictor,
+    suspects: Suspects,
+    sigmas: SigmaWatch,
 }
 
 impl Pipeline {
@@ -93,6 +102,8 @@ impl Pipeline {
             estimator: estimator(&settings, &map),
             tracker: Tracker::new(settings.track),
             predictor: Predictor::default(),
+            suspects: Suspects::default(),
+            sigmas: SigmaWatch::default(),
             settings,
             map,
             camera: None,
@@ -118,9 +129,11 @@ impl Pipeline {
         self.settings = settings;
     }
 
-    /// Forgets the last attitude and the track: the next frame is the first.
+    /// Forgets the last attitude, the track, and what was wrong with markers and sigmas: the next frame is the first.
     pub fn reset(&mut self) {
         self.previous = None;
+        self.suspects.forget();
+        self.sigmas.forget();
         self.tracker.reset();
         self.predictor.forget();
     }
@@ -159,6 +172,17 @@ impl Pipeline {
         Some((&latched.frame_id, latched.camera.as_ref()))
     }
 
+    /// Returns the markers that are left out too often for wrong detections; a frame that shows one has no trusted pose.
+    pub fn suspect_markers(&self) -> impl Iterator<Item = SuspectMarker> {
+        self.suspects.iter()
+    }
+
+    /// Returns by what factor the sigmas were too small or too large over the last ten seconds; none before a fit.
+    #[must_use]
+    pub fn sigma_factor(&self) -> Option<SigmaFactor> {
+        self.sigmas.factor()
+    }
+
     /// Returns a warning about the principal point of the latest camera info, if it passes and is far from the centre.
     #[must_use]
     pub fn off_centre(&self) -> Option<OffCentre> {
@@ -171,7 +195,12 @@ impl Pipeline {
 
     /// Returns the outcome of one frame.
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
-        let mut outcome = self.estimate(frame).unwrap_or_else(FrameOutcome::refused);
+        let outcome = self.estimate(frame).unwrap_or_else(FrameOutcome::refused);
+        if let Some(solution) = outcome.solution() {
+            self.sigmas.take(frame.stamp, solution);
+            self.suspects.take(frame.stamp, &outcome, solution);
+        }
+        let mut outcome = self.suspects.judge(outcome);
         self.tracker.follow(frame.stamp, &mut outcome);
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {

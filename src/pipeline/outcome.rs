@@ -14,7 +14,7 @@ pub struct FrameOutcome {
     pub result: Result<Solution, Refusal>,
     /// The solution behind a refusal that was judged on its numbers: for the status, never to be flown.
     pub doubtful: Option<Solution>,
-    /// How the detections lie about a solution that is not trusted; empty for others.
+    /// How the detections lie about the best fit, trusted or not, those left out as wrong too; empty without a fit.
     pub residuals: Vec<MarkerResidual>,
     /// Marker ids that the solution rests on.
     pub used_ids: Vec<u32>,
@@ -58,11 +58,7 @@ impl FrameOutcome {
             .map(|o| o.id)
             .partition(|&id| solution.excluded.contains(id));
         let initialisation = Some(solution.initialisation);
-        let residuals = if solution.is_trusted() {
-            Vec::new()
-        } else {
-            residuals(&solution, camera, observations)
-        };
+        let residuals = residuals(&solution, camera, observations);
         let (result, doubtful) = match doubt(&solution, settings) {
             Some(refusal) => (Err(refusal), Some(solution)),
             None => (Ok(solution), None),
@@ -78,6 +74,15 @@ impl FrameOutcome {
             track: FrameTrack::default(),
             causes: None,
         }
+    }
+
+    /// Returns the outcome with its pose refused, if it has one.
+    pub(super) fn refused_for(mut self, refusal: Refusal) -> Self {
+        if let Ok(solution) = self.result {
+            self.doubtful = Some(solution);
+            self.result = Err(refusal);
+        }
+        self
     }
 
     /// Returns the outcome with the detections that were left out before it.

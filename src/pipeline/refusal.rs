@@ -1,6 +1,6 @@
 //! The reasons for which a frame gives no pose.
 
-use super::{OutcomeCode, Stamp};
+use super::{OutcomeCode, Stamp, SuspectMarker};
 use crate::camera::CameraError;
 use crate::estimation::EstimateError;
 use crate::text::{clip, digits, list, quoted};
@@ -146,6 +146,9 @@ pub enum Refusal {
         /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
         unclear: Vec<u32>,
     },
+    /// The frame shows a marker that is left out too often for wrong detections.
+    #[error("expected markers to be left out now and then, but {0}")]
+    SuspectMarker(SuspectMarker),
     /// A second pose fits nearly as well.
     #[error(
         "expected one pose to stand out, but another is {ambiguity:.3} times as likely (max_ambiguity {limit})"
@@ -179,7 +182,7 @@ impl Refusal {
             Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
             Self::Estimate(error) => code_of(error),
             Self::TooUncertain { .. } => OutcomeCode::DegenerateGeometry,
-            Self::NotTrusted { .. } => OutcomeCode::NotTrusted,
+            Self::NotTrusted { .. } | Self::SuspectMarker(_) => OutcomeCode::NotTrusted,
             Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
         }
     }

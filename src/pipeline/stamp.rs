@@ -19,6 +19,11 @@ impl Stamp {
         self.sec as i64 * 1_000_000_000 + self.nanosec as i64
     }
 
+    /// Returns the time in seconds, to a microsecond.
+    pub(super) fn seconds(self) -> f64 {
+        f64::from(self.sec) + 1e-9 * f64::from(self.nanosec)
+    }
+
     /// Returns the stamp of a whole time in nanoseconds; none where no stamp holds it.
     pub(super) fn from_nanoseconds(nanoseconds: i64) -> Option<Self> {
         Some(Self {

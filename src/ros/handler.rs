@@ -113,6 +113,7 @@ impl Handler {
         if let Some(predicted) = &mut self.outputs.predicted_points {
             predicted.on_detections(&header, &self.pipeline, &mut self.monitor.tally);
         }
+        self.monitor.on_residuals(&answer, &self.pipeline);
         // Last: they are for people, who don't wait for a millisecond.
         self.publish_markers(&header, &frame, &outcome);
         self.monitor.on_published(&answer);

@@ -160,19 +160,20 @@ impl Monitor {
                 self.watch.on_age(image, now);
             }
         }
-        self.watch.on_outcome(outcome, now);
         self.count(answer);
         let Ok(solution) = &outcome.result else {
             self.on_refusal(answer, fault);
             return None;
         };
         self.on_pose(outcome);
-        // A marker at the edge of the image was not judged.
-        let used = outcome.used_ids.iter().map(|&id| (id, false));
-        let excluded = solution.excluded.ids().map(|id| (id, true));
-        self.watch.on_pose(used.chain(excluded), now);
         let rotation = &solution.camera_from_tanker.rotation;
         self.watch.on_attitude(rotation, now)
+    }
+
+    /// Takes note of how well a frame's residuals agree with what is stated, once it has been answered.
+    pub(super) fn on_residuals(&mut self, answer: &Answer, pipeline: &Pipeline) {
+        self.watch
+            .on_outcome(answer.outcome, pipeline, answer.begin);
     }
 
     fn count(&mut self, answer: &Answer) {

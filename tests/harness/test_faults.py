@@ -384,7 +384,7 @@ CASES = {
     ),
     "marker in the wrong place": Case(
         "suspect_marker",
-        "marker 6 was left out of all",
+        "marker 6 was left out of 100% of the frames that show it",
         misplace_a_marker,
         send_good,
     ),

@@ -20,10 +20,12 @@ pub enum Fault {
     StaleCameraInfo,
     /// Detections and camera info name different frames.
     FrameMismatch,
-    /// A marker is left out of every pose.
+    /// A marker is left out of frame after frame.
     SuspectMarker,
-    /// Frame after frame is not trusted.
+    /// Frame after frame is not trusted, or leaves a marker out.
     NotTrusted,
+    /// Residuals are larger or smaller than the sigmas say.
+    Sigma,
     /// The tanker stands off its nominal attitude.
     UnexpectedAttitude,
     /// Images are from the future, or from long ago.
@@ -51,7 +53,7 @@ const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -61,6 +63,7 @@ impl Fault {
         Self::FrameMismatch,
         Self::SuspectMarker,
         Self::NotTrusted,
+        Self::Sigma,
         Self::UnexpectedAttitude,
         Self::ClockOffset,
         Self::StampJump,
@@ -84,6 +87,7 @@ impl Fault {
             Self::FrameMismatch => "frame_mismatch",
             Self::SuspectMarker => "suspect_marker",
             Self::NotTrusted => "not_trusted",
+            Self::Sigma => "sigma",
             Self::UnexpectedAttitude => "unexpected_attitude",
             Self::ClockOffset => "clock_offset",
             Self::StampJump => "stamp_jump",
@@ -103,6 +107,7 @@ impl Fault {
             | Self::FrameMismatch
             | Self::SuspectMarker
             | Self::NotTrusted
+            | Self::Sigma
             | Self::ClockOffset
             | Self::Undecodable => SHOWN_BY_FRAMES,
             // Looked for every second.

@@ -1,7 +1,8 @@
 //! Detects what is wrong around the node, logs when it begins and ends, and shows it in `/diagnostics` in between.
 //!
-//! `watch` notices, `faults` remembers and says. `stamp_age` judges stamps, `suspects` markers, `residuals` frames that
-//! are not trusted, `attitude` mount and nominal attitude; `latency` keeps quantiles. Time is an argument, so that tests need no clock.
+//! `watch` notices, `faults` remembers and says. `stamp_age` judges stamps, `residuals` frames that do not agree, and
+//! sigmas, `attitude` mount and nominal attitude; `latency` keeps quantiles. Time is an argument, so that tests need no
+//! clock.
 
 mod attitude;
 mod faults;
@@ -9,16 +10,14 @@ mod latency;
 mod refusals;
 mod residuals;
 mod stamp_age;
-mod suspects;
 mod watch;
 
 pub use attitude::{Attitude, Unexpected};
 pub use faults::{Fault, Faults};
 pub use latency::{Latency, WINDOW_S};
 pub use refusals::fault_of;
-pub use residuals::{Doubtful, Residuals};
+pub use residuals::Residuals;
 pub use stamp_age::{ImageAge, StampAge};
-pub use suspects::Suspects;
 pub use watch::{Second, Watch};
 
 pub use super::clock::ClockSilence;

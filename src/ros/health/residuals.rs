@@ -1,24 +1,27 @@
-//! Frames that are not trusted, again and again: no wrong detection, but a map, a calibration or sigmas that are wrong.
+//! Frames that are not trusted or leave a marker out, again and again: no wrong detection, but a map, a calibration or
+//! sigmas that are wrong.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector2;
 
-use crate::pipeline::MarkerResidual;
+use crate::pipeline::{MarkerResidual, SigmaFactor};
 
 /// s; what is older than this counts for little.
 const MEMORY_S: f64 = 3.0;
-/// How long so many must not be trusted.
+/// How long so many must not agree.
 const LASTING: Duration = Duration::from_secs(3);
 /// How many of them at least.
 const MANY: u32 = 10;
-/// Of the frames with a fit: more are no accident. Correct ones are refused once in a thousand.
+/// Of the frames with a fit: more are no accident. Of correct ones one in a thousand does not agree.
 const MANY_OF_ALL: f64 = 0.3;
 /// Fewer, and it is over.
 const FEW_OF_ALL: f64 = 0.1;
 /// Of the squared residuals: what points the same way in frame after frame is no noise.
 const SYSTEMATIC: f64 = 0.3;
+/// Sigmas that are wrong by a larger factor are a fault.
+const WRONG_BY: f64 = 1.3;
 
 /// Sums in which frames fade away.
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,56 +32,40 @@ struct Sums {
     squared_sigmas: f64,
 }
 
-/// A fit that is not trusted.
-#[derive(Debug, Clone, Copy)]
-pub struct Doubtful<'a> {
-    /// Sum of its squared residuals over their variances.
-    pub chi_squared: f64,
-    /// Of it.
-    pub degrees_of_freedom: u16,
-    /// Of its detections.
-    pub residuals: &'a [MarkerResidual],
-}
-
 /// Judges fits one after the other.
 #[derive(Debug, Default)]
 pub struct Residuals {
     latest: Option<Instant>,
     fits: f64,
-    doubtful: f64,
-    chi_squared: f64,
-    degrees_of_freedom: f64,
+    disagreeing: f64,
     markers: BTreeMap<u32, Sums>,
     run: Option<Run>,
     lasts: bool,
 }
 
-/// A time in which many are not trusted.
+/// A time in which many do not agree.
 #[derive(Debug)]
 struct Run {
     since: Instant,
-    doubtful: u32,
+    disagreeing: u32,
 }
 
 impl Residuals {
-    /// Takes a fit, trusted or not.
-    pub fn take(&mut self, doubtful: Option<Doubtful>, now: Instant) {
+    /// Takes the residuals of a fit, those of markers that were left out too; `agrees`: all markers, so that it is
+    /// trusted and leaves none out.
+    pub fn take(&mut self, agrees: bool, residuals: &[MarkerResidual], now: Instant) {
         self.fade(now);
         self.fits += 1.0;
-        if let Some(fit) = doubtful {
-            self.doubtful += 1.0;
-            self.chi_squared += fit.chi_squared;
-            self.degrees_of_freedom += f64::from(fit.degrees_of_freedom);
-            for seen in fit.residuals {
-                let squared_px2 = seen.residual_px.norm_squared();
-                let sums = self.markers.entry(seen.id).or_default();
-                sums.weight += 1.0;
-                sums.residual_px += seen.residual_px;
-                sums.squared_px2 += squared_px2;
-                sums.squared_sigmas += squared_px2 / seen.sigma_px.powi(2);
-            }
+        self.disagreeing += f64::from(u8::from(!agrees));
+        for seen in residuals {
+            let squared_px2 = seen.residual_px.norm_squared();
+            let sums = self.markers.entry(seen.id).or_default();
+            sums.weight += 1.0;
+            sums.residual_px += seen.residual_px;
+            sums.squared_px2 += squared_px2;
+            sums.squared_sigmas += squared_px2 / seen.sigma_px.powi(2);
         }
-        let share = self.doubtful / self.fits;
+        let share = self.disagreeing / self.fits;
         if share < FEW_OF_ALL {
             self.lasts = false;
         }
@@ -88,37 +75,62 @@ impl Residuals {
         }
         let run = self.run.get_or_insert(Run {
             since: now,
-            doubtful: 0,
+            disagreeing: 0,
         });
-        run.doubtful = run.doubtful.saturating_add(u32::from(doubtful.is_some()));
+        run.disagreeing = run.disagreeing.saturating_add(u32::from(!agrees));
         let lasted = now.saturating_duration_since(run.since);
-        self.lasts |= run.doubtful >= MANY && lasted >= LASTING;
+        self.lasts |= run.disagreeing >= MANY && lasted >= LASTING;
     }
 
-    /// Returns what is wrong and where to look, while it lasts.
+    /// Returns what is wrong with markers and where to look, while it lasts.
     #[must_use]
-    pub fn in_words(&self) -> Option<String> {
+    pub fn in_words(&self, sigmas: Option<SigmaFactor>) -> Option<String> {
         if !self.lasts {
             return None;
         }
-        let percent = 100.0 * self.doubtful / self.fits;
-        let ratio = self.chi_squared / self.degrees_of_freedom.max(1.0);
-        let cause = if self.systematic() >= SYSTEMATIC {
-            "the residuals point the same way in frame after frame: the marker map or the calibration (camera_info) is \
-             wrong"
-                .to_owned()
-        } else {
+        let percent = 100.0 * self.disagreeing / self.fits;
+        let factor = sigmas.map_or(1.0, |sigmas| sigmas.factor);
+        let cause = if self.is_systematic() {
+            format!("wrong detections do not last like that; {SAME_WAY}")
+        } else if factor > WRONG_BY {
             format!(
-                "the residuals scatter about zero: the sigmas (pixel_sigma_px, or those of the detections) are too small, \
-                 {:.1} times as large would fit",
-                ratio.sqrt()
+                "wrong detections do not last like that; the residuals scatter about zero: the sigmas (pixel_sigma_px, or those \
+                 of the detections) are too small, {factor:.1} times as large would fit"
             )
+        } else {
+            "most frames fit their sigmas, and the residuals of the others scatter: so many wrong detections are the detector's"
+                .to_owned()
         };
         Some(format!(
-            "{percent:.0}% of the frames with a fit are NOT_TRUSTED, chi-squared is {ratio:.1} per degree of freedom \
-             (expected 1). Wrong detections do not last like that; {cause}{}",
+            "{percent:.0}% of the frames with a fit are NOT_TRUSTED or leave a marker out: {cause}{}",
             self.worst()
         ))
+    }
+
+    /// Returns what is wrong with sigmas, if they are.
+    #[must_use]
+    pub fn sigmas_in_words(&self, sigmas: Option<SigmaFactor>) -> Option<String> {
+        let sigmas = sigmas.filter(SigmaFactor::is_settled)?;
+        let SigmaFactor { factor, span_s, .. } = sigmas;
+        let which = "the sigmas (pixel_sigma_px, or those of the detections)";
+        if factor > WRONG_BY {
+            let cause = if self.is_systematic() {
+                SAME_WAY
+            } else {
+                "they scatter about zero"
+            };
+            Some(format!(
+                "{which} are too small: over {span_s:.0} s residuals were {factor:.1} times as large as they say, and {cause}. \
+                 Covariances are too small by that factor squared"
+            ))
+        } else if factor < 1.0 / WRONG_BY {
+            Some(format!(
+                "{which} are too large: over {span_s:.0} s residuals were {factor:.2} times as large as they say. Covariances are \
+                 too large, and wrong detections up to that size pass"
+            ))
+        } else {
+            None
+        }
     }
 
     /// Returns which marker fits worst.
@@ -148,14 +160,14 @@ impl Residuals {
         )
     }
 
-    /// Returns the share of the squared residuals that the markers' means make up.
-    fn systematic(&self) -> f64 {
+    /// Returns whether the markers' means make up much of the squared residuals.
+    fn is_systematic(&self) -> bool {
         let (mut of_means, mut all) = (0.0, 0.0);
         for sums in self.markers.values().filter(|sums| sums.weight > 0.5) {
             of_means += sums.residual_px.norm_squared() / sums.weight;
             all += sums.squared_px2;
         }
-        if all > 0.0 { of_means / all } else { 0.0 }
+        of_means > SYSTEMATIC * all
     }
 
     fn fade(&mut self, now: Instant) {
@@ -164,14 +176,8 @@ impl Residuals {
         };
         let passed_s = now.saturating_duration_since(latest).as_secs_f64();
         let left = (-passed_s / MEMORY_S).exp();
-        for sum in [
-            &mut self.fits,
-            &mut self.doubtful,
-            &mut self.chi_squared,
-            &mut self.degrees_of_freedom,
-        ] {
-            *sum *= left;
-        }
+        self.fits *= left;
+        self.disagreeing *= left;
         for sums in self.markers.values_mut() {
             sums.weight *= left;
             sums.residual_px *= left;
@@ -180,6 +186,10 @@ impl Residuals {
         }
     }
 }
+
+/// What residuals show that do not scatter.
+const SAME_WAY: &str = "the residuals point the same way in frame after frame: the marker map or the calibration \
+                        (camera_info) is wrong";
 
 #[cfg(test)]
 mod tests {
@@ -198,26 +208,26 @@ mod tests {
         }
     }
 
-    /// Takes frames, of which some are not trusted, with these residuals; returns the words.
+    fn by(factor: f64) -> SigmaFactor {
+        SigmaFactor {
+            factor,
+            fits: 200,
+            span_s: 10.0,
+        }
+    }
+
+    /// Takes frames with these residuals, of which some do not agree; returns the words.
     fn pass(
         residuals: &mut Residuals,
         start: Instant,
         frames: u32,
-        mut doubtful: impl FnMut(u32) -> Option<Vec<MarkerResidual>>,
+        mut of: impl FnMut(u32) -> (bool, Vec<MarkerResidual>),
     ) -> Option<String> {
         for frame in 0..frames {
-            let found = doubtful(frame);
-            let fit = found.as_ref().map(|residuals| Doubtful {
-                chi_squared: residuals
-                    .iter()
-                    .map(|seen| seen.residual_px.norm_squared() / SIGMA_PX.powi(2))
-                    .sum(),
-                degrees_of_freedom: 2,
-                residuals,
-            });
-            residuals.take(fit, start + frame * FRAME);
+            let (agrees, found) = of(frame);
+            residuals.take(agrees, &found, start + frame * FRAME);
         }
-        residuals.in_words()
+        residuals.in_words(Some(by(2.0)))
     }
 
     #[test]
@@ -225,8 +235,8 @@ mod tests {
         let mut residuals = Residuals::default();
         let start = Instant::now();
         let off = |frame: u32| {
-            (!frame.is_multiple_of(4))
-                .then(|| vec![at(1, 0.2, 0.1), at(3, -2.0, 0.5), at(4, 0.5, -0.4)])
+            let found = vec![at(1, 0.2, 0.1), at(3, -2.0, 0.5), at(4, 0.5, -0.4)];
+            (frame.is_multiple_of(4), found)
         };
         assert_eq!(
             pass(&mut residuals, start, 60, off),
@@ -245,28 +255,66 @@ mod tests {
             "{words}"
         );
         assert!(words.contains("next is marker 4"), "{words}");
+        let sigmas = residuals.sigmas_in_words(Some(by(2.0))).expect("twice");
+        assert!(sigmas.contains("the marker map or the"), "{sigmas}");
 
-        let good = |_| None;
+        let good = |_| (true, vec![at(3, 0.1, 0.1)]);
         assert!(pass(&mut residuals, start + 100 * FRAME, 40, good).is_some());
         assert_eq!(pass(&mut residuals, start + 140 * FRAME, 400, good), None);
     }
 
     #[test]
-    fn residuals_that_scatter_name_the_sigmas() {
+    fn residuals_that_scatter_name_sigmas_or_the_detector() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let words = pass(&mut Residuals::default(), Instant::now(), 200, |_| {
-            // Uniform with a standard deviation of 1 px, twice the sigma.
-            let mut noise = || rng.random_range(-3.0_f64.sqrt()..3.0_f64.sqrt());
+        let mut residuals = Residuals::default();
+        let words = pass(&mut residuals, Instant::now(), 200, |frame| {
+            let mut noise = || rng.random_range(-2.0..2.0);
             let seen = |id| at(id, noise(), noise());
-            Some([1, 2, 3].map(seen).to_vec())
+            (frame.is_multiple_of(2), [1, 2, 3].map(seen).to_vec())
         })
         .expect("10 s");
-        assert!(words.contains("the sigmas (pixel_sigma_px"), "{words}");
+        assert!(
+            words.contains("the sigmas (pixel_sigma_px") && words.contains("2.0 times as large"),
+            "{words}"
+        );
+        let words = residuals.in_words(Some(by(1.05))).expect("as before");
+        assert!(words.contains("are the detector's"), "{words}");
+    }
+
+    #[test]
+    fn sigmas_are_wrong_from_a_factor_of_one_third_on_once_it_is_settled() {
+        let residuals = Residuals::default();
+        for (of, wrong) in [
+            (0.5, true),
+            (0.8, false),
+            (1.0, false),
+            (1.25, false),
+            (1.5, true),
+        ] {
+            let words = residuals.sigmas_in_words(Some(by(of)));
+            assert_eq!(words.is_some(), wrong, "{words:?}");
+        }
+        let words = residuals.sigmas_in_words(Some(by(1.5))).unwrap_or_default();
+        assert!(
+            words.contains("too small") && words.contains("1.5 times"),
+            "{words}"
+        );
+        let words = residuals.sigmas_in_words(Some(by(0.5))).unwrap_or_default();
+        assert!(
+            words.contains("too large") && words.contains("0.50 times"),
+            "{words}"
+        );
+        let early = SigmaFactor {
+            fits: 99,
+            ..by(2.0)
+        };
+        assert_eq!(residuals.sigmas_in_words(Some(early)), None);
+        assert_eq!(residuals.sigmas_in_words(None), None);
     }
 
     #[test]
     fn few_frames_among_many_are_wrong_detections() {
-        let wrong = |frame: u32| (frame.is_multiple_of(10)).then(|| vec![at(1, 30.0, 0.0)]);
+        let wrong = |frame: u32| (!frame.is_multiple_of(10), vec![at(1, 30.0, 0.0)]);
         let mut residuals = Residuals::default();
         assert_eq!(pass(&mut residuals, Instant::now(), 1000, wrong), None);
     }

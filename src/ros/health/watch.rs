@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use nalgebra::UnitQuaternion;
 
 use super::{
-    Attitude, ClockSilence, Doubtful, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge,
-    Suspects, Unexpected,
+    Attitude, ClockSilence, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge,
+    Unexpected,
 };
-use crate::pipeline::{FrameOutcome, OutcomeCode};
+use crate::pipeline::{FrameOutcome, Pipeline};
 use crate::refuelling::ExpectedAttitude;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
@@ -22,6 +22,8 @@ const STEADY_S: u32 = 3;
 const GRACE: Duration = Duration::from_secs(2);
 /// Missing detections are logged after this long.
 const WAIT: Duration = Duration::from_secs(3);
+/// How often the residuals of the last seconds are looked at.
+const BETWEEN_SIGMAS: Duration = Duration::from_millis(200);
 /// Most ends of others that are named; a strange graph may have any number.
 const MOST_MISFITS: usize = 16;
 
@@ -112,8 +114,8 @@ pub struct Watch {
     /// Publishers of camera info that fit, a second ago.
     cameras: usize,
     stamps: Jumps,
-    suspects: Suspects,
     residuals: Residuals,
+    sigmas_seen: Option<Instant>,
     stamp_age: StampAge,
     /// Judges where the tanker stands; none while nothing depends on that.
     attitude: Option<Attitude>,
@@ -146,8 +148,8 @@ impl Watch {
             camera: Arrivals::default(),
             cameras: 0,
             stamps: Jumps::default(),
-            suspects: Suspects::default(),
             residuals: Residuals::default(),
+            sigmas_seen: None,
             stamp_age: StampAge::default(),
             attitude: None,
             holds_outputs: false,
@@ -224,24 +226,46 @@ impl Watch {
         attitude.unexpected()
     }
 
-    /// Takes note of how the fit of a frame is judged by its residuals, if it has one.
-    pub fn on_outcome(&mut self, outcome: &FrameOutcome, now: Instant) {
+    /// Takes note of the fit of a frame, if it has one: its residuals, and markers that are left out too often.
+    pub fn on_outcome(&mut self, outcome: &FrameOutcome, pipeline: &Pipeline, now: Instant) {
         let Some(solution) = outcome.solution() else {
             return;
         };
-        if outcome.code() == OutcomeCode::NotTrusted {
-            let doubtful = Doubtful {
-                chi_squared: solution.chi_squared,
-                degrees_of_freedom: solution.degrees_of_freedom,
-                residuals: &outcome.residuals,
-            };
-            self.residuals.take(Some(doubtful), now);
-        } else {
-            self.residuals.take(None, now);
+        let agrees = solution.is_trusted() && solution.excluded.ids().next().is_none();
+        self.residuals.take(agrees, &outcome.residuals, now);
+        if self.is_time_for_sigmas(now) {
+            self.watch_sigmas(pipeline, now);
         }
-        match self.residuals.in_words() {
-            Some(words) => self.faults.see(Fault::NotTrusted, &words, now),
-            None => self.faults.end(Fault::NotTrusted),
+        self.faults.end(Fault::SuspectMarker);
+        for suspect in pipeline.suspect_markers() {
+            if outcome.residuals.iter().any(|seen| seen.id == suspect.id) {
+                let (of, words) = (suspect.id.to_string(), suspect.to_string());
+                self.faults.see_of(Fault::SuspectMarker, &of, &words, now);
+            }
+        }
+    }
+
+    /// Whether the residuals of the last seconds are to be looked at again: a median of many numbers.
+    fn is_time_for_sigmas(&mut self, now: Instant) -> bool {
+        let is_time = self
+            .sigmas_seen
+            .is_none_or(|seen| now.saturating_duration_since(seen) >= BETWEEN_SIGMAS);
+        if is_time {
+            self.sigmas_seen = Some(now);
+        }
+        is_time
+    }
+
+    fn watch_sigmas(&mut self, pipeline: &Pipeline, now: Instant) {
+        let sigmas = pipeline.sigma_factor();
+        for (fault, words) in [
+            (Fault::NotTrusted, self.residuals.in_words(sigmas)),
+            (Fault::Sigma, self.residuals.sigmas_in_words(sigmas)),
+        ] {
+            match words {
+                Some(words) => self.faults.see(fault, &words, now),
+                None => self.faults.end(fault),
+            }
         }
     }
 
@@ -266,20 +290,6 @@ impl Watch {
                 "stamps of {topic} went {jump}: two sources in turn, a clock that was set, or a recording that begins anew"
             );
             self.faults.see(Fault::StampJump, &words, now);
-        }
-    }
-
-    /// Takes note of a pose: of the markers that it was given, and whether it leaves them out.
-    pub fn on_pose(&mut self, markers: impl Iterator<Item = (u32, bool)>, now: Instant) {
-        for (id, is_left_out) in markers {
-            if is_left_out {
-                if let Some(words) = self.suspects.left_out(id, now) {
-                    let of = id.to_string();
-                    self.faults.see_of(Fault::SuspectMarker, &of, &words, now);
-                }
-            } else if self.suspects.used(id) {
-                self.faults.end_of(Fault::SuspectMarker, &id.to_string());
-            }
         }
     }
 
