@@ -46,9 +46,9 @@ pub struct Picture {
     pub rejected: Vec<Seen>,
     /// Where the pose puts the markers that were not detected, camera frame, m.
     pub unseen_in_camera: Vec<Point3<f64>>,
-    /// The uncertainty of the position; none without a trusted pose.
+    /// The uncertainty of the position; `None` without a trusted pose.
     pub ellipsoid: Option<Ellipsoid>,
-    /// Corners of the image at [`FRUSTUM_DEPTH_M`]: top left, top right, bottom right, bottom left; none where the
+    /// Corners of the image at [`FRUSTUM_DEPTH_M`]: top left, top right, bottom right, bottom left; `None` where the
     /// size of the image is not known or the lens model does not reach its corners.
     pub frustum: Option<[Point3<f64>; 4]>,
 }
@@ -119,7 +119,7 @@ fn seen(
     })
 }
 
-/// Returns the point of a pixel's ray at a depth, camera frame; none for a pixel without a ray.
+/// Returns the point of a pixel's ray at a depth, camera frame; `None` for a pixel without a ray.
 fn point_of_pixel(camera: &Camera, pixel: Pixel, depth_m: f64) -> Option<Point3<f64>> {
     let ray = camera.ray_from_pixel(pixel).ok()?;
     Some(Point3::new(ray.x * depth_m, ray.y * depth_m, depth_m))

@@ -17,7 +17,7 @@ use crate::text::quoted;
 pub struct Place {
     /// What holds the text, usually a path.
     pub source: String,
-    /// Line and column, from 1; none where the fault has no place in a text.
+    /// Line and column, from 1; `None` where the fault has no place in a text.
     pub line_column: Option<(u64, u64)>,
 }
 

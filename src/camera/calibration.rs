@@ -16,7 +16,7 @@ pub const FIRST_COEFFICIENT: usize = 4;
 pub type CalibrationChange = SVector<f64, CALIBRATION_SIZE>;
 
 impl Camera {
-    /// Returns the derivative of the pixel (u, v) of a ray by the calibration, px; none where the ray has no pixel.
+    /// Returns the derivative of the pixel (u, v) of a ray by the calibration, px; `None` where the ray has no pixel.
     ///
     /// Without a lens model D means `plumb_bob`'s and `rational_polynomial`'s coefficients at zero, and with
     /// `equidistant` its four; the columns of further ones are zero.

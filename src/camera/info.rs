@@ -393,7 +393,7 @@ fn check_intrinsics(
     Ok(indices.map(|index| values[index]))
 }
 
-/// Returns the lens of the raw image; none when it does not distort.
+/// Returns the lens of the raw image; `None` when it does not distort.
 fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
     check_finite("d", d)?;
     if let Some((index, &value)) = d
@@ -471,7 +471,7 @@ fn names_a_fisheye(model: &str) -> bool {
     FISHEYE_NAMES.iter().any(|part| model.contains(part))
 }
 
-/// Returns the image size that detections see; none when it is not known.
+/// Returns the image size that detections see; `None` when it is not known.
 fn image_size(info: &CameraInfo) -> Result<Option<(u32, u32)>, CameraError> {
     let full = full_size(info.width, info.height)?;
     let RegionOfInterest {

@@ -109,7 +109,7 @@ impl Camera {
     }
 
     /// Returns width and height of the image that detections come from, px, after region of interest
-    /// and binning; none when the camera info left them 0.
+    /// and binning; `None` when the camera info left them 0.
     #[must_use]
     pub fn image_size_px(&self) -> Option<(u32, u32)> {
         self.image_size_px

@@ -20,7 +20,7 @@ pub(crate) fn likelihood_ratio(rival_chi_squared: f64, chosen_chi_squared: f64) 
         .min(1.0)
 }
 
-/// Returns the minimum in front of the camera that the mirrored target leads to; none when there is
+/// Returns the minimum in front of the camera that the mirrored target leads to; `None` when there is
 /// none that counts, or it is the chosen pose itself.
 pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     let pose = &chosen.pose;
@@ -36,14 +36,14 @@ pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     (!is_same(&fit.pose.rotation, &pose.rotation)).then_some(fit)
 }
 
-/// Returns the attitude of the mirrored target; none when the markers lie on one line.
+/// Returns the attitude of the mirrored target; `None` when the markers lie on one line.
 #[inline]
 pub(crate) fn mirror_image(problem: &Problem, pose: &CentredPose) -> Option<Rotation3<f64>> {
     let normal = smallest_axis(&problem.points.scatter)?;
     Some(mirrored(&pose.rotation, &pose.centre_in_camera, &normal))
 }
 
-/// Returns the direction in which the markers spread least, of any length; none when they lie on one line.
+/// Returns the direction in which the markers spread least, of any length; `None` when they lie on one line.
 ///
 /// It is the column of a high power of the adjugate, whose largest eigenvalue belongs to the least of the
 /// scatter. With `q` the ratio of the two least spreads the direction is off by about `q^16` rad, enough

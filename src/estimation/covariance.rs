@@ -12,7 +12,7 @@ use crate::camera::{Camera, Ray};
 use crate::geometry::skew;
 
 /// Returns the covariance of a converged orthogonal iteration, rotation before position of the
-/// markers' mean; none when the points do not fix the pose.
+/// markers' mean; `None` when the points do not fix the pose.
 ///
 /// The iteration minimises an error whose weights are not those of the noise, so its covariance is
 /// the sandwich `H⁻¹ B H⁻¹` and not the inverse of its own curvature: `J = [−[R p]×, I]`,

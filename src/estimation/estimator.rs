@@ -424,7 +424,7 @@ fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
     })
 }
 
-/// Returns the pose with a given attitude that suits the points best; none where their rays fix no position.
+/// Returns the pose with a given attitude that suits the points best; `None` where their rays fix no position.
 fn expected_pose(
     camera: &Camera,
     observations: &[Observation],

@@ -134,7 +134,7 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// Returns predicted minus seen pixel, px; none where the marker has no pixel at this pose.
+    /// Returns predicted minus seen pixel, px; `None` where the marker has no pixel at this pose.
     #[must_use]
     pub fn residual_px(
         &self,
@@ -184,7 +184,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Returns predicted minus seen pixel, px; none where the marker has no pixel at this pose.
+    /// Returns predicted minus seen pixel, px; `None` where the marker has no pixel at this pose.
     #[must_use]
     pub fn residual_px(&self, camera: &Camera, seen: &Observation) -> Option<Vector2<f64>> {
         seen.residual_px(camera, &self.camera_from_tanker)

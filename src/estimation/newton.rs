@@ -188,7 +188,7 @@ fn newton_step<A: Arithmetic>(
     NewtonStep { step, promise }
 }
 
-/// Returns `H⁻¹ g`; none unless the matrix is positive definite.
+/// Returns `H⁻¹ g`; `None` unless the matrix is positive definite.
 #[inline(always)]
 fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
     let upper = [h.m11, h.m12, h.m13, h.m22, h.m23, h.m33];

@@ -169,7 +169,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the minimum in whose basin `seed` lies; none when there is none, or when chi-squared
+    /// Returns the minimum in whose basin `seed` lies; `None` when there is none, or when chi-squared
     /// there will clearly exceed a limit.
     pub(crate) fn descend_below(
         &self,
@@ -255,7 +255,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Returns chi-squared and the squared residuals, px², at a pose; none where a point has no pixel there.
+    /// Returns chi-squared and the squared residuals, px², at a pose; `None` where a point has no pixel there.
     fn chi_squared_at(&self, pose: &CentredPose) -> Option<(f64, f64)> {
         match self.doubts {
             Some(budget) => self.doubt(budget).at(*pose),
@@ -285,7 +285,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns by how much chi-squared rises when a fit is turned to another attitude, at the position that
-    /// suits it best; none where a point has no pixel there.
+    /// suits it best; `None` where a point has no pixel there.
     pub(crate) fn rise(&self, fit: &Fit, rotation: &Rotation3<f64>) -> Option<f64> {
         let rise = match (self.refinement, self.doubts) {
             (Refinement::MaximumLikelihood, Some(budget)) => {
@@ -307,7 +307,7 @@ impl<'a> Problem<'a> {
         Some(rise.max(0.0))
     }
 
-    /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; none for the
+    /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; `None` for the
     /// paper's cost, which is not weighted by the noise.
     ///
     /// The cost is the sum of squared whitened residuals times squared depths, to first order.

@@ -24,7 +24,7 @@ pub(crate) struct Fit {
     pub(crate) chi_squared: f64,
     /// px², over columns and rows.
     pub(crate) squared_residuals_px: f64,
-    /// The factored information `JᵀΣ⁻¹J`, rotation before position of the mean; none for the paper's own
+    /// The factored information `JᵀΣ⁻¹J`, rotation before position of the mean; `None` for the paper's own
     /// estimate, whose covariance is not the inverse of a curvature.
     pub(crate) solver: Option<Solver>,
     pub(crate) iterations: u16,
@@ -147,7 +147,7 @@ fn dot(a: &Vector, b: &Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Returns chi-squared and the squared residuals in px² at a pose; none when a point has no pixel there.
+/// Returns chi-squared and the squared residuals in px² at a pose; `None` when a point has no pixel there.
 pub(crate) fn squared_residuals(
     residuals: &impl Residuals,
     pose: &CentredPose,

@@ -56,7 +56,7 @@ fn looked_at_closely(
     Ok(PoseCovariance::from_point(&about_mean, lever))
 }
 
-/// Returns a wider covariance, rotation before position of the markers' mean; none where the fit's own is honest.
+/// Returns a wider covariance, rotation before position of the markers' mean; `None` where the fit's own is honest.
 fn flattest(problem: &Problem, fit: &Fit, covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
     let information = upper_left(covariance).try_inverse()?;

@@ -31,7 +31,7 @@ impl PoseCovariance {
     }
 
     /// Returns `eᵀ Σ⁻¹ e`, the squared Mahalanobis distance of a pose error (NEES when the error is
-    /// against the truth); none when the covariance is not positive definite.
+    /// against the truth); `None` when the covariance is not positive definite.
     #[must_use]
     pub fn mahalanobis_squared(&self, error: &Vector6<f64>) -> Option<f64> {
         self.0

@@ -82,7 +82,7 @@ impl Motion {
         }
     }
 
-    /// Returns `eᵀ Σ⁻¹ e` for an error by [`motion_error`]; none when the covariance is not positive definite.
+    /// Returns `eᵀ Σ⁻¹ e` for an error by [`motion_error`]; `None` when the covariance is not positive definite.
     #[must_use]
     pub fn mahalanobis_squared(&self, error: &Vector12) -> Option<f64> {
         self.covariance

@@ -43,7 +43,7 @@ pub(super) fn check_frame_id(expected: &str, got: &str) -> Result<(), Refusal> {
 ///
 /// # Inputs
 /// * `default_sigma_px`: for detections with sigma 0.
-/// * `marker_in_tanker`: where a marker sits, m; none for an id that is not on the tanker.
+/// * `marker_in_tanker`: where a marker sits, m; `None` for an id that is not on the tanker.
 ///
 /// # Errors
 /// [`Refusal`] on the first fault: pixel not finite, sigma out of range, id unknown, id twice, pixel

@@ -107,7 +107,7 @@ impl ImageEdges {
 }
 
 impl RawImage {
-    /// Returns none where the camera info does not say how the rectified image was made.
+    /// Returns `None` where the camera info does not say how the rectified image was made.
     fn new(info: &CameraInfo, rectified: &Camera) -> Option<Self> {
         let camera = Camera::from_info(info, false).ok()?;
         let rectified_from_raw = Matrix3::from_row_slice(&info.r);
@@ -120,7 +120,7 @@ impl RawImage {
         })
     }
 
-    /// Returns the distance of a rectified pixel's place in the raw image from that image's nearest edge; none where
+    /// Returns the distance of a rectified pixel's place in the raw image from that image's nearest edge; `None` where
     /// it has no such place.
     fn distance_px(&self, rectified: Pixel) -> Option<f64> {
         let ray = self.rectified.ray_from_pixel(rectified).ok()?;

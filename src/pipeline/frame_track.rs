@@ -6,10 +6,10 @@ use crate::tracking::TrackOutcome;
 /// What one frame did to the track.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameTrack {
-    /// What became of the frame in the filter; none without a filter, or when the frame is not of this camera or
+    /// What became of the frame in the filter; `None` without a filter, or when the frame is not of this camera or
     /// has no time.
     pub outcome: Option<TrackOutcome>,
-    /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; none
+    /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; `None`
     /// without a confirmed track, or when the frame came late.
     pub motion: Option<Motion>,
 }

@@ -165,7 +165,7 @@ impl Pipeline {
         result
     }
 
-    /// Returns what the latest camera info came to, with its frame; none before the first one.
+    /// Returns what the latest camera info came to, with its frame; `None` before the first one.
     #[must_use]
     pub fn camera(&self) -> Option<(&str, Result<&Camera, &CameraError>)> {
         let latched = self.camera.as_ref()?;
@@ -177,7 +177,7 @@ impl Pipeline {
         self.suspects.iter()
     }
 
-    /// Returns by what factor the sigmas were too small or too large over the last ten seconds; none before a fit.
+    /// Returns by what factor the sigmas were too small or too large over the last ten seconds; `None` before a fit.
     #[must_use]
     pub fn sigma_factor(&self) -> Option<SigmaFactor> {
         self.sigmas.factor()

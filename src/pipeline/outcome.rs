@@ -22,11 +22,11 @@ pub struct FrameOutcome {
     pub rejected_ids: Vec<u32>,
     /// Those at the edge of the image, of which the solver knew nothing.
     pub left_out: LeftOut,
-    /// Where the iteration started; none when no solve was attempted.
+    /// Where the iteration started; `None` when no solve was attempted.
     pub initialisation: Option<Initialisation>,
     /// What the frame did to the track, if there is one.
     pub track: FrameTrack,
-    /// What each cause of the error budget did in this frame; none without a budget or a solution.
+    /// What each cause of the error budget did in this frame; `None` without a budget or a solution.
     pub causes: Option<FrameCauses>,
 }
 

@@ -206,7 +206,7 @@ fn with_nominal_attitude(
     (pose, PoseCovariance((left + left.transpose()) * 0.5))
 }
 
-/// Returns the pixel of a marker and the covariance of a detection about it; none where it has none, or may be
+/// Returns the pixel of a marker and the covariance of a detection about it; `None` where it has none, or may be
 /// behind the camera.
 fn project(
     camera: &Camera,

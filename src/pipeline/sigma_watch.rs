@@ -72,7 +72,7 @@ impl SigmaWatch {
         }
     }
 
-    /// Returns the factor; none before a fit.
+    /// Returns the factor; `None` before a fit.
     pub(super) fn factor(&self) -> Option<SigmaFactor> {
         let (first_s, _) = self.ratios.front()?;
         let (latest_s, _) = self.ratios.back()?;

@@ -24,7 +24,7 @@ impl Stamp {
         f64::from(self.sec) + 1e-9 * f64::from(self.nanosec)
     }
 
-    /// Returns the stamp of a whole time in nanoseconds; none where no stamp holds it.
+    /// Returns the stamp of a whole time in nanoseconds; `None` where no stamp holds it.
     pub(super) fn from_nanoseconds(nanoseconds: i64) -> Option<Self> {
         Some(Self {
             sec: i32::try_from(nanoseconds.div_euclid(1_000_000_000)).ok()?,

@@ -35,13 +35,13 @@ impl Tracker {
         }
     }
 
-    /// Returns the attitude that the track expects; none without a confirmed one that reaches so far.
+    /// Returns the attitude that the track expects; `None` without a confirmed one that reaches so far.
     pub(super) fn expected_rotation(&self, stamp: Stamp) -> Option<Rotation3<f64>> {
         let motion = self.0.as_ref()?.predict(stamp.nanoseconds()).ok()?;
         Some(motion.b_from_a.rotation.to_rotation_matrix())
     }
 
-    /// Returns the last motion of track or candidate; none without either.
+    /// Returns the last motion of track or candidate; `None` without either.
     pub(super) fn last_motion(&self) -> Option<LastMotion> {
         self.0.as_ref()?.last_motion()
     }

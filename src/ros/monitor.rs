@@ -228,7 +228,7 @@ impl Monitor {
         }
     }
 
-    /// Returns how old an image is by the node's time; none while that stands still for want of `/clock`.
+    /// Returns how old an image is by the node's time; `None` while that stands still for want of `/clock`.
     fn age_of(&self, stamp: Time) -> Option<ImageAge> {
         let silence = self.clock.silence();
         if silence.is_some_and(|silence| !silence.ever) {

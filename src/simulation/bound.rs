@@ -7,7 +7,7 @@ use crate::camera::Ray;
 use crate::geometry::{PoseCovariance, skew};
 
 /// Returns the least covariance that an unbiased estimate of a scene's pose can have with `sigma_px`
-/// of noise, in the coordinates of [`PoseCovariance`]; none when the markers leave the pose open.
+/// of noise, in the coordinates of [`PoseCovariance`]; `None` when the markers leave the pose open.
 ///
 /// Written out apart from the estimator, from the projection at the truth, so that the two can be
 /// held against each other.

@@ -50,7 +50,7 @@ pub struct PaperBound {
     pub position_m: f64,
 }
 
-/// Returns the least errors that an unbiased estimate can have, to first order in the noise; none when
+/// Returns the least errors that an unbiased estimate can have, to first order in the noise; `None` when
 /// the markers leave the pose open.
 #[must_use]
 pub fn paper_bound(scene: &Scene, sigma_px: f64) -> Option<PaperBound> {
@@ -77,7 +77,7 @@ pub fn paper_bound(scene: &Scene, sigma_px: f64) -> Option<PaperBound> {
     })
 }
 
-/// Derivative of (yaw, pitch, roll) by a small turn of the tanker about the receiver's axes; none at ±90° pitch.
+/// Derivative of (yaw, pitch, roll) by a small turn of the tanker about the receiver's axes; `None` at ±90° pitch.
 fn angles_by_turn(attitude: &Rotation3<f64>) -> Option<Matrix3<f64>> {
     let (_, pitch, yaw) = attitude.euler_angles();
     let (after_yaw, after_pitch) = (

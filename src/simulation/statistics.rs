@@ -30,7 +30,7 @@ pub struct Summary {
     pub position_median_m: f64,
     /// Share of the images with more than [`FAILURE_DEG`], or without a pose.
     pub failures: f64,
-    /// Share of the solved images whose iteration ended elsewhere than when started at the truth; none
+    /// Share of the solved images whose iteration ended elsewhere than when started at the truth; `None`
     /// where that was not asked: see [`TrialError::other_minimum`].
     pub other_minimum: Option<f64>,
     /// Median of the iteration's steps.

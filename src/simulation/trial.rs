@@ -83,7 +83,7 @@ pub struct TrialError {
     pub position_m: f64,
     /// Steps of the orthogonal iteration; 0 for methods without.
     pub iterations: u32,
-    /// Whether the iteration ended elsewhere than the same iteration started at the truth; none for a
+    /// Whether the iteration ended elsewhere than the same iteration started at the truth; `None` for a
     /// method without iteration, and for one that is stopped before it settles.
     pub other_minimum: Option<bool>,
 }
@@ -156,7 +156,7 @@ impl Solver {
         Ok((iterated.camera_from_tanker, iterated.iterations))
     }
 
-    /// Returns the error of each method on the same noisy image; none where a method gives no pose.
+    /// Returns the error of each method on the same noisy image; `None` where a method gives no pose.
     pub fn trial(
         &self,
         scene: &Scene,

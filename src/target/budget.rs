@@ -209,7 +209,7 @@ impl RawFlex {
 }
 
 impl RawShape {
-    /// Returns the markers that it moves; none unless it names one marker or one tag of the map.
+    /// Returns the markers that it moves; `None` unless it names one marker or one tag of the map.
     fn ids(&self, markers: &[Marker], tags: &[(&Tag, Option<&Spanned<f64>>)]) -> Option<Vec<u32>> {
         match (&self.id, &self.tag) {
             (Some(id), None) => {

@@ -39,7 +39,7 @@ impl MarkerMap {
         ))
     }
 
-    /// Returns a map that comes with the program, or none if no such map is shipped.
+    /// Returns a map that comes with the program; `None` if no such map is shipped.
     #[must_use]
     pub fn shipped(name: &str) -> Option<Self> {
         let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name)?;
@@ -70,7 +70,7 @@ impl MarkerMap {
         &self.budget
     }
 
-    /// Returns where a marker sits, tanker frame, m; none for an id that the map does not hold.
+    /// Returns where a marker sits, tanker frame, m; `None` for an id that the map does not hold.
     #[must_use]
     pub fn get(&self, id: u32) -> Option<Point3<f64>> {
         let index = self
@@ -80,7 +80,7 @@ impl MarkerMap {
         Some(self.markers[index].marker_in_tanker)
     }
 
-    /// Returns the tag with this id; none if the map holds no such tag.
+    /// Returns the tag with this id; `None` if the map holds no such tag.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&Tag> {
         let index = self.tags.binary_search_by_key(&id, |tag| tag.id).ok()?;

@@ -17,7 +17,7 @@ const CORNERS: [(f64, f64); 4] = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 
 pub struct Tag {
     /// Its id in its family.
     pub id: u32,
-    /// Its family; none where any will do.
+    /// Its family; `None` where any will do.
     pub family: Option<String>,
     /// Length of a side, between the corners that are detected, m.
     pub size_m: f64,
@@ -50,7 +50,7 @@ impl Tag {
             .is_none_or(|family| bare(family) == bare(name))
     }
 
-    /// Returns the id of the tag that a point would be a corner of; none for an id that no corner has.
+    /// Returns the id of the tag that a point would be a corner of; `None` for an id that no corner has.
     pub(super) const fn id_of_corner(point: u32) -> Option<u32> {
         if point % IDS_PER_TAG < 4 {
             Some(point / IDS_PER_TAG)

@@ -101,7 +101,7 @@ impl Filter {
         self.challenger = None;
     }
 
-    /// Returns the track at the last accepted frame; none while it is not confirmed.
+    /// Returns the track at the last accepted frame; `None` while it is not confirmed.
     #[must_use]
     pub fn track(&self) -> Option<&Track> {
         self.confirmed().map(|state| &state.track)

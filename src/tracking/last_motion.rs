@@ -27,7 +27,7 @@ impl LastMotion {
         self.is_confirmed
     }
 
-    /// Returns the motion at a stamp, with its growing covariance; none before the last accepted frame.
+    /// Returns the motion at a stamp, with its growing covariance; `None` before the last accepted frame.
     #[must_use]
     pub fn at(&self, stamp_ns: i64) -> Option<Motion> {
         let gap_s = seconds(stamp_ns, self.track.stamp_ns);
@@ -36,7 +36,7 @@ impl LastMotion {
 }
 
 impl Filter {
-    /// Returns the last motion of track or candidate; none without either.
+    /// Returns the last motion of track or candidate; `None` without either.
     #[must_use]
     pub fn last_motion(&self) -> Option<LastMotion> {
         let (track, noise, is_confirmed) = self.believed()?;

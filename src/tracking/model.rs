@@ -160,7 +160,7 @@ pub(super) struct Innovation {
 }
 
 impl Innovation {
-    /// Returns none when the covariances are so far apart that their sum has no factor.
+    /// Returns `None` when the covariances are so far apart that their sum has no factor.
     pub(super) fn new(
         predicted: &Motion,
         b_from_a: &Isometry3<f64>,
@@ -182,7 +182,7 @@ impl Innovation {
         })
     }
 
-    /// Returns the motion corrected by the measurement; none when its covariance would not be positive
+    /// Returns the motion corrected by the measurement; `None` when its covariance would not be positive
     /// definite.
     pub(super) fn corrected(&self, predicted: &Motion) -> Option<Motion> {
         let before = Blocks::of(predicted);

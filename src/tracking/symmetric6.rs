@@ -22,7 +22,7 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Returns the factors of a symmetric matrix, of which the lower triangle is read; none unless it
+    /// Returns the factors of a symmetric matrix, of which the lower triangle is read; `None` unless it
     /// is positive definite, and far enough from singular for its inverse to mean something.
     #[inline(always)]
     pub(super) fn new(a: &[[f64; 6]; 6]) -> Option<Self> {

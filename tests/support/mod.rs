@@ -97,7 +97,7 @@ fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
     )
 }
 
-/// Levenberg-Marquardt from `start`; none when it does not settle.
+/// Levenberg-Marquardt from `start`; `None` when it does not settle.
 pub fn oracle_maximum_likelihood(
     camera: &Camera,
     observations: &[Observation],

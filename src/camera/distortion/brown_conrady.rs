@@ -185,7 +185,7 @@ impl BrownConrady {
         (distorted, derivative)
     }
 
-    /// Returns the distorted point and its derivative by the ideal one; none outside the valid disc.
+    /// Returns the distorted point and its derivative by the ideal one; `None` outside the valid disc.
     pub fn distort(&self, ideal: Point2<f64>) -> Option<(Point2<f64>, Matrix2<f64>)> {
         let valid = ideal.coords.norm_squared() <= self.max_radius * self.max_radius; // false for NaN
         if !valid {

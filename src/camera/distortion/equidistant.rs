@@ -71,7 +71,7 @@ impl Equidistant {
         (value, slope)
     }
 
-    /// Returns the distorted point and its derivative by the ideal one; none outside the valid disc.
+    /// Returns the distorted point and its derivative by the ideal one; `None` outside the valid disc.
     ///
     /// With `n` the direction outwards the derivative is `h 1 + (g' - h) n nᵀ`: `h = θ_d / r` along
     /// the circle, `g' = dθ_d/dr` across it.

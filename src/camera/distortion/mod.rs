@@ -40,7 +40,7 @@ pub(super) enum Lens {
 }
 
 impl Lens {
-    /// Returns the distorted point and its derivative by the ideal one; none outside the valid disc.
+    /// Returns the distorted point and its derivative by the ideal one; `None` outside the valid disc.
     pub fn distort(&self, ideal: Point2<f64>) -> Option<(Point2<f64>, Matrix2<f64>)> {
         match self {
             Self::BrownConrady(lens) => lens.distort(ideal),

@@ -78,7 +78,7 @@ struct Row {
     by_calibration: nalgebra::SMatrix<f64, 2, CALIBRATION_SIZE>,
 }
 
-/// Returns what the causes did; none where a point has no pixel at the pose or the pose is not fixed.
+/// Returns what the causes did; `None` where a point has no pixel at the pose or the pose is not fixed.
 ///
 /// # Inputs
 /// * `attitude_information`: of the prior about each axis, 1/rad²; 0 without one.

@@ -73,7 +73,7 @@ pub(crate) struct Elimination<const K: usize> {
 }
 
 impl<const K: usize> Elimination<K> {
-    /// Returns the elimination; none where the sums are not finite.
+    /// Returns the elimination; `None` where the sums are not finite.
     #[inline(always)]
     pub(super) fn new(gram: &Gram<f64, K>, modes: usize) -> Option<Self> {
         let mut lower = [[0.0; K]; K];

@@ -413,7 +413,7 @@ fn add_squares<N: Number>(slope: &mut SlopeSums<N>, sight: &Sight<N>, there: N) 
 }
 
 impl<const K: usize> LensBudget<'_, K> {
-    /// Gives each point to `add`; none where one has no pixel.
+    /// Gives each point to `add`; `None` where one has no pixel.
     fn visit(
         &self,
         pose: &CentredPose,
@@ -437,7 +437,7 @@ impl<const K: usize> LensBudget<'_, K> {
     }
 }
 
-/// Returns how a point is seen from a pose; none where it has no pixel.
+/// Returns how a point is seen from a pose; `None` where it has no pixel.
 fn sight_through(
     camera: &Camera,
     seen: &Observation,

@@ -25,7 +25,7 @@ impl CollinearityCost {
         centre_from_rotation: [[0.0; LANES]; 9],
     };
 
-    /// Makes this the cost of some points; none when their rays do not fix a position (all of them one
+    /// Makes this the cost of some points; `None` when their rays do not fix a position (all of them one
     /// and the same).
     #[inline(always)]
     pub(crate) fn fill<A: Arithmetic>(

@@ -66,7 +66,7 @@ impl Information {
         }
     }
 
-    /// Returns what solves with it; none unless it is positive definite, and far enough from singular for
+    /// Returns what solves with it; `None` unless it is positive definite, and far enough from singular for
     /// its inverse to mean something.
     #[inline(always)]
     pub(crate) fn solver(&self) -> Option<Solver> {

@@ -3,7 +3,7 @@
 /// A symmetric 3×3 matrix by its upper triangle: 11, 12, 13, 22, 23, 33.
 pub(crate) type Symmetric3<T = f64> = [T; 6];
 
-/// Returns `A⁻¹`; none unless the matrix is positive definite and its determinant is at least this share
+/// Returns `A⁻¹`; `None` unless the matrix is positive definite and its determinant is at least this share
 /// of the product of `scale`, the entries that its diagonal was made of.
 #[inline(always)]
 pub(crate) fn positive_inverse(
@@ -24,7 +24,7 @@ pub(crate) fn positive_inverse(
         .then(|| cofactors.map(|cofactor| cofactor * share))
 }
 
-/// Returns `A⁻¹`; none for a singular matrix.
+/// Returns `A⁻¹`; `None` for a singular matrix.
 #[inline(always)]
 pub(crate) fn inverse(a: &Symmetric3) -> Option<Symmetric3> {
     let cofactors = cofactors(a);

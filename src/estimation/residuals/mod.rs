@@ -42,7 +42,7 @@ pub(crate) trait Residuals {
     /// Share by which the sum may rise in a step that is taken; 0 where the weights do not depend on the pose.
     const RISE: f64;
 
-    /// Returns the residuals' sums at a pose; none when a point has no pixel there.
+    /// Returns the residuals' sums at a pose; `None` when a point has no pixel there.
     fn linearise(&self, pose: &CentredPose) -> Option<Linearised<Self::Kept>>;
 
     /// Returns the same without second derivatives, where that is less work; `kept` is from a pose nearby.

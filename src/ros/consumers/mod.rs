@@ -80,7 +80,7 @@ pub struct Consumers {
 }
 
 impl Consumers {
-    /// Returns the outputs of a configuration, opened; none when it asks for none.
+    /// Returns the outputs of a configuration, opened; `None` when it asks for none.
     ///
     /// # Errors
     /// [`EndpointError`] when a name is malformed or the middleware refuses.

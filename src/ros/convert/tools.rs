@@ -70,7 +70,7 @@ pub fn pose_message(header: Header, pose: &Isometry3<f64>) -> messages::PoseStam
     }
 }
 
-/// Returns the pose that a message holds; none when its numbers are not those of a pose.
+/// Returns the pose that a message holds; `None` when its numbers are not those of a pose.
 #[must_use]
 pub fn isometry(pose: &messages::Pose) -> Option<Isometry3<f64>> {
     let (p, q) = (&pose.position, &pose.orientation);

@@ -48,7 +48,7 @@ fn marker_id(found: &Detection2D) -> Result<u32, Refusal> {
     }
 }
 
-/// Returns the `class_id` with the highest score; none if there is no hypothesis.
+/// Returns the `class_id` with the highest score; `None` if there is no hypothesis.
 fn best_class(results: &[ObjectHypothesisWithPose]) -> Result<Option<&str>, Refusal> {
     if let [only] = results {
         return Ok(Some(&only.hypothesis.class_id)); // its score decides nothing

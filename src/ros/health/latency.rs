@@ -25,7 +25,7 @@ impl Latency {
         self.frames.push_back((now, seconds));
     }
 
-    /// Returns the median and the 99th percentile, s; none without a frame in the window.
+    /// Returns the median and the 99th percentile, s; `None` without a frame in the window.
     pub fn p50_and_p99_s(&mut self, now: Instant) -> Option<(f64, f64)> {
         let window = Duration::from_secs(WINDOW_S);
         let old = |(at, _): &(Instant, f64)| now.saturating_duration_since(*at) > window;

@@ -117,7 +117,7 @@ pub struct Watch {
     residuals: Residuals,
     sigmas_seen: Option<Instant>,
     stamp_age: StampAge,
-    /// Judges where the tanker stands; none while nothing depends on that.
+    /// Judges where the tanker stands; `None` while nothing depends on that.
     attitude: Option<Attitude>,
     /// Whether outputs stop while it stands where it should not.
     holds_outputs: bool,

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// A pose has six of them.
 pub const POSE_DEGREES_OF_FREEDOM: f64 = 6.0;
 
-/// Returns the value that a share `p` of the values does not exceed (nearest rank); none without values.
+/// Returns the value that a share `p` of the values does not exceed (nearest rank); `None` without values.
 pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -15,12 +15,12 @@ pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
     sorted.get(rank.saturating_sub(1)).copied()
 }
 
-/// Returns the mean; none without values.
+/// Returns the mean; `None` without values.
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Returns the root of the mean square; none without values.
+/// Returns the root of the mean square; `None` without values.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let squares: Vec<f64> = values.into_iter().map(|value| value * value).collect();
     mean(&squares).map(f64::sqrt)

@@ -26,7 +26,7 @@ struct Line6<'a> {
     style: Style,
 }
 
-/// Returns the figure of an outcome; none for one that is a table only.
+/// Returns the figure of an outcome; `None` for one that is a table only.
 pub fn of(outcome: &Outcome) -> Option<Figure> {
     match outcome.experiment.name {
         "fig5" => Some(by_series(outcome, "number of points", Axis::FromZero)),

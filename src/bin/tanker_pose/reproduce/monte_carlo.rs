@@ -129,7 +129,7 @@ impl Outcome {
 }
 
 impl Point {
-    /// Returns the summary of one method; none where the experiment does not run it.
+    /// Returns the summary of one method; `None` where the experiment does not run it.
     pub fn of(&self, method: Method) -> Option<&Summary> {
         self.summaries
             .iter()

@@ -15,7 +15,7 @@ use crate::terminal::{progress_bar, say};
 pub struct Report {
     json: bool,
     bar: ProgressBar,
-    /// Frames from one line to the next; none where a bar is seen instead.
+    /// Frames from one line to the next; `None` where a bar is seen instead.
     line_every: Option<u64>,
     length: Option<u32>,
     frames: u64,

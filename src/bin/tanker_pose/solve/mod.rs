@@ -276,7 +276,7 @@ impl Solver {
         sight.as_ref()
     }
 
-    /// Where a point sits on the tanker: as it says itself, or as the map says; none when neither does.
+    /// Where a point sits on the tanker: as it says itself, or as the map says; `None` when neither does.
     fn marker(&self, point: &InputPoint) -> Result<Option<Point3<f64>>, String> {
         match (point.x, point.y, point.z) {
             (Some(x), Some(y), Some(z)) => {

@@ -149,7 +149,7 @@ impl Heard {
         self.estimation(now).filter(|_| is_about_silence)
     }
 
-    /// Returns the faults of the latest report, by key; none when reports do not come.
+    /// Returns the faults of the latest report, by key; `None` when reports do not come.
     pub fn faults(&self, now: Instant) -> Option<&[(String, String)]> {
         self.estimation(now).map(|_| self.faults.as_slice())
     }

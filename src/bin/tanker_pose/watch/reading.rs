@@ -20,7 +20,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Returns what a message says; none if it holds no rotation.
+    /// Returns what a message says; `None` if it holds no rotation.
     pub fn of(message: &PoseWithCovarianceStamped) -> Option<Self> {
         let optical = PoseEstimate {
             b_from_a: isometry(&message.pose.pose)?,
