@@ -17,7 +17,7 @@ use tanker_pose::estimation::Estimator;
 use tanker_pose::pipeline::{self, Detection, FrameOutcome, ImageEdges, Refusal, observe};
 use tanker_pose::target::MarkerMap;
 
-use self::lines::{InputFrame, InputPoint, OutputFrame, reason};
+use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
 use crate::options::{self, CalibrationError, EstimatorOptions};
 
 /// Longest line that is read: a frame of ten thousand points.
@@ -191,6 +191,11 @@ impl Solver {
     }
 
     fn answer(&mut self, line: &[u8], number: u64) -> OutputFrame {
+        if let Some(got) = not_an_object(line) {
+            let message =
+                format!("line {number}: expected a JSON object with camera and points, got {got}");
+            return OutputFrame::malformed(serde_json::Value::Null, message);
+        }
         match serde_json::from_slice::<InputFrame>(line) {
             Ok(frame) => match self.solve(&frame) {
                 Ok(outcome) => OutputFrame::new(frame.id, outcome),

@@ -52,6 +52,9 @@ impl Scene<'_> {
         }
         let silence = self.heard.silence(self.now);
         let listened = self.heard.listened(self.now);
+        if silence.is_none() && listened < RECENT {
+            return (Tone::Plain, "listening for its frames".to_owned());
+        }
         let why = match self.heard.estimation_since_last_frame(self.now) {
             Some(report) => plain(&report.message),
             None if silence.unwrap_or(listened) < REPORT_EVERY => {
@@ -224,6 +227,31 @@ pub fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn node_that_was_listened_to_for_a_moment_is_not_called_silent() {
+        let since = Instant::now();
+        let heard = Heard::new(since);
+        let state = |milliseconds| {
+            let scene = Scene {
+                heard: &heard,
+                missing: None,
+                processes: 1,
+                now: since + Duration::from_millis(milliseconds),
+            };
+            scene.state()
+        };
+        for milliseconds in [0, 500] {
+            let expected = (Tone::Plain, "listening for its frames".to_owned());
+            assert_eq!(state(milliseconds), expected);
+        }
+        let (tone, words) = state(1500);
+        assert_eq!(tone, Tone::Bad);
+        assert!(
+            words.starts_with("the node has answered no frame for 1"),
+            "{words}"
+        );
+    }
 
     #[test]
     fn foreign_text_moves_no_cursor_and_stays_short() {
