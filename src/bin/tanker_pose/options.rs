@@ -196,24 +196,6 @@ pub fn calibration(path: &Path) -> Result<CameraInfo, CalibrationError> {
     Ok(info)
 }
 
-/// Returns a parser of numbers within bounds.
-pub fn between(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text: &str| number(text, min, max)
-}
-
-fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
-    let value: f64 = text
-        .parse()
-        .map_err(|_| format!("expected a number, got {text:?}"))?;
-    if (min..=max).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!(
-            "expected a number from {min} to {max}, got {value}"
-        ))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

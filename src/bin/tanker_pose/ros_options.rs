@@ -1,4 +1,4 @@
-//! ROS arguments of tools that are nodes.
+//! Options of tools that are nodes: ROS arguments, and numbers within bounds.
 
 use clap::Args;
 use tanker_pose::ros::arguments::{ArgumentError, Arguments};
@@ -75,4 +75,22 @@ pub fn check_no_parameters(
         }
     }
     Ok(warnings)
+}
+
+/// Returns a parser of numbers within bounds.
+pub fn between(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text: &str| number(text, min, max)
+}
+
+fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
+    let value: f64 = text
+        .parse()
+        .map_err(|_| format!("expected a number, got {text:?}"))?;
+    if (min..=max).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "expected a number from {min} to {max}, got {value}"
+        ))
+    }
 }

@@ -22,7 +22,7 @@ use tanker_pose::ros::node::NODE_NAME;
 use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::target::MarkerMap;
 
-use crate::options::between;
+use crate::ros_options::between;
 use crate::simulate::ApproachOptions;
 pub use error::DemoError;
 use flight::{End, Flight};

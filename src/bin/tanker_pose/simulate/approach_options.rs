@@ -11,7 +11,8 @@ use tanker_pose::pipeline::error_budget;
 use tanker_pose::simulation::{Approach, ApproachSettings};
 use tanker_pose::target::MarkerMap;
 
-use crate::options::{self, CalibrationError, between};
+use crate::options::{self, CalibrationError};
+use crate::ros_options::between;
 
 /// The camera of the paper, for those who name none.
 pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");

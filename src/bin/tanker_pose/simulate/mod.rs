@@ -19,8 +19,7 @@ use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
 use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::simulation::Approach;
 
-use crate::options::between;
-use crate::ros_options::{NoParametersError, RosOptions, check_no_parameters};
+use crate::ros_options::{NoParametersError, RosOptions, between, check_no_parameters};
 pub use approach_options::{ApproachError, ApproachOptions};
 use fault::gross_error;
 pub use pace::Pace;

@@ -22,8 +22,7 @@ use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNo
 use tanker_pose::ros::topics::STATUS;
 use tanker_pose::ros::{LOG_TARGET, logging};
 
-use crate::options::between;
-use crate::ros_options::{NoParametersError, RosOptions, check_no_parameters};
+use crate::ros_options::{NoParametersError, RosOptions, between, check_no_parameters};
 use ears::Ears;
 use heard::Heard;
 use screen::Screen;
