@@ -1,7 +1,7 @@
 //! The one declaration of each parameter: its name, type, default, range, unit, whether it is fixed, and words.
 //!
 //! `tanker_pose parameters --yaml` and `--markdown` write them for people; tests hold `config/tanker_pose.yaml` and
-//! `docs/parameters.md` against that. A parameter that nothing reads is a field of [`Values`] that the compiler warns of.
+//! `docs/parameters.md` against that, and find a parameter that nothing uses.
 
 use ros2_node::parameters::{
     Key, count, double, frame_id, integer, one_of, optional_text, switch, text,

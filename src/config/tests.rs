@@ -55,3 +55,25 @@ fn the_track_cannot_be_switched_off_under_an_output_that_needs_it() {
     assert!(refused.to_string().contains(words), "{refused}");
     assert_eq!(set("track", ParameterValue::Bool(true)), Ok(()));
 }
+
+/// The compiler is silent about fields of `Values` that nothing reads: they come from a macro of another crate.
+#[test]
+fn every_parameter_is_used() {
+    let sources = [
+        include_str!("attitude.rs"),
+        include_str!("configuration.rs"),
+        include_str!("consumers.rs"),
+    ];
+    let used: Vec<&str> = sources
+        .iter()
+        .map(|source| source.split("#[cfg(test)]").next().unwrap_or_default())
+        .flat_map(|code| code.split("values.").skip(1))
+        .filter_map(|rest| {
+            rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+                .next()
+        })
+        .collect();
+    for spec in TABLE {
+        assert!(used.contains(&spec.name), "{} is not used", spec.name);
+    }
+}

@@ -222,8 +222,7 @@ impl<T> Key<T> {
 /// - `TABLE`, what [`Parameters`](crate::parameters::Parameters) are checked against,
 /// - `SECTIONS`, the same for [files and pages](crate::parameters::Section),
 /// - `KEYS`, with a typed [`Key`](crate::parameters::Key) for each parameter,
-/// - `Values`, with a typed field for each: made of the checked parameters with `Values::from`. A parameter that the
-///   program never reads is a field that is never read, of which the compiler warns.
+/// - `Values`, with a typed field for each: made of the checked parameters with `Values::from`.
 ///
 /// ```
 /// use ros2_node::parameters::{ParameterValue, Parameters, double, text};
