@@ -39,7 +39,7 @@ const CALM: FilterSettings = FilterSettings {
 
 fn settings(track: Option<FilterSettings>) -> Settings {
     Settings {
-        track,
+        track: track.map(|track| track.checked().expect("in range")),
         pixel_sigma_px: SIGMA_PX,
         ..Configuration::from(&Parameters::new(TABLE)).settings
     }

@@ -1,7 +1,7 @@
 //! What the processing of a frame depends on.
 
 use crate::estimation::EstimatorSettings;
-use crate::tracking::FilterSettings;
+use crate::tracking::CheckedFilterSettings;
 
 /// Everything a frame's processing depends on, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +16,8 @@ pub struct Settings {
     pub calibration: CalibrationSigmas,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
-    /// Track settings; `None` disables tracking. Settings out of the filter's ranges disable it too: the table allows none.
-    pub track: Option<FilterSettings>,
+    /// Track settings; `None` disables tracking.
+    pub track: Option<CheckedFilterSettings>,
 }
 
 /// Standard deviations of the calibration and of a shaking image; all 0: both are exact.

@@ -6,23 +6,23 @@
 use nalgebra::Rotation3;
 
 use super::{FrameOutcome, Refusal, Stamp};
-use crate::tracking::{Filter, FilterSettings, LastMotion, TrackOutcome};
+use crate::tracking::{CheckedFilterSettings, Filter, LastMotion, TrackOutcome};
 
 /// The filter between the frames, or none.
 #[derive(Debug)]
 pub(super) struct Tracker(Option<Filter>);
 
 impl Tracker {
-    pub(super) fn new(settings: Option<FilterSettings>) -> Self {
-        Self(settings.and_then(|settings| Filter::new(settings).ok()))
+    pub(super) fn new(settings: Option<CheckedFilterSettings>) -> Self {
+        Self(settings.map(Filter::from))
     }
 
     /// Takes settings for the next frame on; the track stays.
-    pub(super) fn set_settings(&mut self, settings: Option<FilterSettings>) {
+    pub(super) fn set_settings(&mut self, settings: Option<CheckedFilterSettings>) {
         match (&mut self.0, settings) {
             (Some(filter), Some(settings)) => {
-                if *filter.settings() != settings && filter.set_settings(settings).is_err() {
-                    self.0 = None;
+                if filter.settings() != settings.settings() {
+                    filter.set_settings(settings);
                 }
             }
             _ => *self = Self::new(settings),

@@ -7,7 +7,8 @@ use super::model::{Innovation, Noise, add_noise, predict};
 use super::settings::Checked;
 use super::symmetric6::{Factor, rows};
 use super::{
-    FilterSettings, FilterSettingsError, MeasurementError, PredictError, StartReason, TrackOutcome,
+    CheckedFilterSettings, FilterSettings, FilterSettingsError, MeasurementError, PredictError,
+    StartReason, TrackOutcome,
 };
 use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
@@ -65,18 +66,25 @@ struct Measured<'a> {
     covariance: PoseCovariance,
 }
 
+impl From<CheckedFilterSettings> for Filter {
+    /// Returns a filter without a track.
+    fn from(settings: CheckedFilterSettings) -> Self {
+        Self {
+            checked: settings.checked,
+            settings: *settings.settings(),
+            state: None,
+            challenger: None,
+        }
+    }
+}
+
 impl Filter {
     /// Returns a filter without a track.
     ///
     /// # Errors
     /// [`FilterSettingsError`] names the first setting out of range.
     pub fn new(settings: FilterSettings) -> Result<Self, FilterSettingsError> {
-        Ok(Self {
-            settings,
-            checked: settings.check()?,
-            state: None,
-            challenger: None,
-        })
+        Ok(Self::from(settings.checked()?))
     }
 
     /// Returns the settings in force.
@@ -86,13 +94,9 @@ impl Filter {
     }
 
     /// Takes other settings from the next frame on; track and candidate stay.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; nothing is changed then.
-    pub fn set_settings(&mut self, settings: FilterSettings) -> Result<(), FilterSettingsError> {
-        self.checked = settings.check()?;
-        self.settings = settings;
-        Ok(())
+    pub fn set_settings(&mut self, settings: CheckedFilterSettings) {
+        self.checked = settings.checked;
+        self.settings = *settings.settings();
     }
 
     /// Forgets track and candidate; the next pose is the first.

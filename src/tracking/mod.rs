@@ -1,6 +1,6 @@
 //! A track from poses: single frames have been estimated and judged, here they become one motion.
 //!
-//! Knows `geometry`, and of `estimation` its small matrices. Time enters as the images' stamps, whole nanoseconds; nothing here reads a
+//! Knows `geometry`. Time enters as the images' stamps, whole nanoseconds; nothing here reads a
 //! clock, and the same frames give the same bits. One frame's way:
 //!
 //! ```text
@@ -25,7 +25,7 @@ mod symmetric6;
 pub use filter::{Filter, Track};
 pub use last_motion::LastMotion;
 pub use outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};
-pub use settings::{FilterSettings, FilterSettingsError};
+pub use settings::{CheckedFilterSettings, FilterSettings, FilterSettingsError};
 
 #[cfg(test)]
 mod tests;

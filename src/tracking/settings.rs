@@ -71,6 +71,21 @@ pub struct FilterSettingsError {
     pub got: f64,
 }
 
+/// Settings that passed their check: what a [`Filter`](super::Filter) is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckedFilterSettings {
+    settings: FilterSettings,
+    pub(super) checked: Checked,
+}
+
+impl CheckedFilterSettings {
+    /// Returns the settings as they were given.
+    #[must_use]
+    pub const fn settings(&self) -> &FilterSettings {
+        &self.settings
+    }
+}
+
 /// Settings that passed their check, in SI and radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Checked {
@@ -93,10 +108,21 @@ pub(super) struct Checked {
 }
 
 impl FilterSettings {
+    /// Returns the settings, checked.
+    ///
+    /// # Errors
+    /// [`FilterSettingsError`] names the first setting out of range.
+    pub fn checked(self) -> Result<CheckedFilterSettings, FilterSettingsError> {
+        Ok(CheckedFilterSettings {
+            checked: self.check()?,
+            settings: self,
+        })
+    }
+
     /// Returns the settings as the filter uses them.
     ///
     /// The ranges keep the ratio of the largest to the smallest variance far from what doubles resolve.
-    pub(super) fn check(&self) -> Result<Checked, FilterSettingsError> {
+    fn check(&self) -> Result<Checked, FilterSettingsError> {
         let within = |name, got: f64, least: f64, most: f64| {
             if (least..=most).contains(&got) {
                 Ok(got)
