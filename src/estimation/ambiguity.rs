@@ -10,7 +10,8 @@ use super::centred_pose::CentredPose;
 use super::problem::{NEGLIGIBLE, Problem};
 use super::refine::Fit;
 
-/// Chord (about rad) under which two poses are the same minimum.
+/// Distance of two rotation matrices, in the Frobenius norm (√2 times the angle between them, rad), under which they
+/// are the same minimum.
 pub(crate) const SAME_MINIMUM: f64 = 0.02;
 
 /// Returns the likelihood of a rival pose over that of the chosen one, at most 1.

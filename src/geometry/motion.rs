@@ -47,17 +47,7 @@ impl Motion {
         PoseCovariance(self.covariance.fixed_view::<6, 6>(0, 0).into_owned())
     }
 
-    /// Returns velocity and rate in the axes of `b`, in which the pose is given.
-    #[must_use]
-    pub fn twist_in_b(&self) -> Twist {
-        Twist {
-            linear: self.velocity_in_b,
-            angular: self.rate_in_b,
-            covariance: self.covariance.fixed_view::<6, 6>(6, 6).into_owned(),
-        }
-    }
-
-    /// Returns the same velocity and rate (of `a` as seen from `b`) in the axes of `a`: what
+    /// Returns velocity and rate (of `a` as seen from `b`) in the axes of `a`: what
     /// `nav_msgs/Odometry` wants, whose twist is in `child_frame_id`.
     ///
     /// Turning into axes that are themselves uncertain adds the attitude's error to the covariance.

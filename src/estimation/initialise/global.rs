@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion};
 
+use crate::estimation::ambiguity::SAME_MINIMUM;
 use crate::estimation::collinearity::{CollinearityCost, PRODUCTS, combined, products};
 use crate::estimation::lanes::four::{Arithmetic, Kernel, LANES, Lane, vectorised};
 use crate::estimation::newton::{self, Minimum};
@@ -15,8 +16,6 @@ const GROUP_SIZE: usize = 60;
 const DESCENTS: usize = 8;
 /// Different minima kept.
 pub(crate) const MAX_MINIMA: usize = 4;
-/// Chord (about rad) under which two descents ended in the same minimum.
-const SAME_MINIMUM: f64 = 0.02;
 
 static ICOSAHEDRAL_GROUP: LazyLock<[Rotation3<f64>; GROUP_SIZE]> = LazyLock::new(icosahedral_group);
 /// The same, four rotations side by side.
