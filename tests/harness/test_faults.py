@@ -25,6 +25,8 @@ from harness.peer import BEST_EFFORT, LATCHED, RELIABLE, Peer
 from harness.processes import Process
 
 PACE_S = 0.05
+# Frames of the approach in messages are 20 ms apart: every third one is as fast as the steps, and faults go by stamps.
+FRAMES_PER_STEP = 3
 # Silence counts from 5 s on, and is looked for once a second.
 PATIENCE_S = 20.0
 # A camera counts as steady after 3 s.
@@ -86,7 +88,7 @@ class Scene:
             return messages.camera_info()
         if topic == "/clock":
             return Clock(clock=Time(sec=self.clock_s))
-        frame = messages.exact_frame(self.index)
+        frame = messages.exact_frame(FRAMES_PER_STEP * self.index)
         frame.header.frame_id = self.frame_id
         return frame
 
@@ -230,7 +232,7 @@ def pitch_the_tanker(scene: Scene) -> None:
 
     def message(topic: str) -> object:
         return (
-            messages.exact_frame(scene.index, pose)
+            messages.exact_frame(FRAMES_PER_STEP * scene.index, pose)
             if topic == "/feature_points"
             else good(scene, topic)
         )
