@@ -64,6 +64,7 @@ impl From<&Parameters> for Configuration {
                 estimator: estimator_settings(&values),
                 pixel_sigma_px: values.pixel_sigma_px,
                 edge_margin_px: values.edge_margin_px,
+                widen_by_sigma_factor: values.widen_by_sigma_factor,
                 rectified: values.rectified,
                 track: values.track.then(|| filter_settings(&values)),
             },
@@ -236,6 +237,7 @@ mod tests {
             ("pixel_sigma_px", Double(0.25)),
             ("edge_margin_px", Double(7.0)),
             ("rectified", Bool(true)),
+            ("widen_by_sigma_factor", Bool(true)),
             ("initialisation", String("global".into())),
             ("refinement", String("none".into())),
             ("max_outliers", Integer(1)),
@@ -263,6 +265,7 @@ mod tests {
             ("fin6", "kc46")
         );
         assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
+        assert!(found.settings.widen_by_sigma_factor);
         assert!(found.use_sim_time && found.lifecycle && found.publish_predicted_points);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);

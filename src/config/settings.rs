@@ -14,6 +14,8 @@ pub struct Settings {
     pub edge_margin_px: f64,
     /// What the calibration may have wrong.
     pub calibration: CalibrationSigmas,
+    /// Sigmas of detections are multiplied by the factor by which residuals scatter more than they say.
+    pub widen_by_sigma_factor: bool,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
     /// Track settings; `None` disables tracking.

@@ -89,6 +89,9 @@ ros2_node::declare_parameters! {
         trust_probability: f64 = double(0.999, [0.5, 0.999_999]);
         /// refuse a pose when the second-best one is at least this likely relative to it; 1: never refuse
         max_ambiguity: f64 = double(0.1, [0.0, 1.0]);
+        /// multiply the sigmas of detections by the factor by which residuals scattered more than they say over the last
+        /// ten seconds, where that is above 1; the fault sigma and the messages of status tell it; see docs/budget.md
+        widen_by_sigma_factor: bool = switch(false);
     }
 
     "The error budget: docs/budget.md; survey and flex stand in the marker map" {

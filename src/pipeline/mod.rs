@@ -24,6 +24,8 @@ mod stamp;
 mod suspect_marker;
 mod suspects;
 mod track;
+mod widening;
+mod window;
 
 use std::sync::Arc;
 
@@ -31,7 +33,7 @@ use nalgebra::Rotation3;
 
 use crate::camera::{Camera, CameraError, CameraInfo, OffCentre};
 use crate::config::Settings;
-use crate::estimation::{EstimateError, Estimator, Initialisation, Observation};
+use crate::estimation::{ErrorBudget, EstimateError, Estimator, Initialisation, Observation};
 use crate::target::MarkerMap;
 
 pub use budget::{budget_in_words, error_budget};
@@ -52,6 +54,7 @@ pub use stamp::Stamp;
 pub use suspect_marker::SuspectMarker;
 use suspects::Suspects;
 use track::Tracker;
+use widening::{Sight, Widening};
 
 /// What the latest camera info came to.
 #[derive(Debug)]
@@ -92,6 +95,7 @@ pub struct Pipeline {
     predictor: Predictor,
     suspects: Suspects,
     sigmas: SigmaWatch,
+    widening: Widening,
 }
 
 impl Pipeline {
@@ -104,6 +108,7 @@ impl Pipeline {
             predictor: Predictor::default(),
             suspects: Suspects::default(),
             sigmas: SigmaWatch::default(),
+            widening: Widening::default(),
             settings,
             map,
             camera: None,
@@ -125,6 +130,9 @@ impl Pipeline {
                 LatchedCamera::new(latched.info, latched.frame_id, settings.rectified)
             });
         }
+        if !settings.widen_by_sigma_factor {
+            self.widening.forget();
+        }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
     }
@@ -134,6 +142,7 @@ impl Pipeline {
         self.previous = None;
         self.suspects.forget();
         self.sigmas.forget();
+        self.widening.forget();
         self.tracker.reset();
         self.predictor.forget();
     }
@@ -183,6 +192,13 @@ impl Pipeline {
         self.sigmas.factor()
     }
 
+    /// Returns what stated sigmas are multiplied by, as the scatter of the last seconds' residuals shows; 1 unless
+    /// [`Settings::widen_by_sigma_factor`] is set and they are too small.
+    #[must_use]
+    pub fn widened_by(&self) -> f64 {
+        self.widening.factor()
+    }
+
     /// Returns a warning about the principal point of the latest camera info, if it passes and is far from the centre.
     #[must_use]
     pub fn off_centre(&self) -> Option<OffCentre> {
@@ -197,8 +213,11 @@ impl Pipeline {
     pub fn process(&mut self, frame: &DetectionFrame) -> FrameOutcome {
         let outcome = self.estimate(frame).unwrap_or_else(FrameOutcome::refused);
         if let Some(solution) = outcome.solution() {
-            self.sigmas.take(frame.stamp, solution);
+            self.sigmas.take(frame.stamp, solution, outcome.widened_by);
             self.suspects.take(frame.stamp, &outcome, solution);
+        }
+        if self.settings.widen_by_sigma_factor {
+            self.watch_scatter(frame.stamp, &outcome);
         }
         let mut outcome = self.suspects.judge(outcome);
         self.tracker.follow(frame.stamp, &mut outcome);
@@ -215,7 +234,11 @@ impl Pipeline {
         let camera = self.camera_for(frame.stamp, &frame.frame_id)?;
         let detections = frame.detections.as_ref().map_err(Clone::clone)?;
         let sigma_px = self.settings.pixel_sigma_px;
-        let observations = observe(camera, detections, sigma_px, |id| self.map.get(id))?;
+        let mut observations = observe(camera, detections, sigma_px, |id| self.map.get(id))?;
+        let widened_by = self.widened_by();
+        for seen in &mut observations {
+            seen.sigma_px *= widened_by;
+        }
         let edges = self
             .camera
             .as_ref()
@@ -225,7 +248,24 @@ impl Pipeline {
             None => (observations, LeftOut::default()),
         };
         let previous = self.expected_rotation(frame.stamp);
-        Ok(solve(&self.estimator, camera, &observations, previous.as_ref()).without(left_out))
+        let mut outcome = solve(&self.estimator, camera, &observations, previous.as_ref());
+        outcome.widened_by = widened_by;
+        Ok(outcome.without(left_out))
+    }
+
+    /// Takes note of how the residuals of a fit differ from earlier ones.
+    fn watch_scatter(&mut self, stamp: Stamp, outcome: &FrameOutcome) {
+        let camera = self.camera.as_ref().map(|latched| &latched.camera);
+        if let (Some(solution), Some(Ok(camera))) = (outcome.solution(), camera) {
+            let sight = Sight {
+                camera,
+                camera_from_tanker: &solution.camera_from_tanker,
+                flex: self.estimator.budget().map_or(&[], ErrorBudget::flex),
+            };
+            let (residuals, map) = (&outcome.residuals, &self.map);
+            self.widening
+                .take(stamp.seconds(), residuals, &sight, |id| map.get(id));
+        }
     }
 
     /// Returns where [`Initialisation::Previous`] starts: what the track expects, or else the last attitude.
@@ -269,7 +309,7 @@ impl Pipeline {
         let view = View {
             camera: self.camera_for(stamp, frame_id)?,
             markers: self.map.markers(),
-            sigma_px: self.settings.pixel_sigma_px,
+            sigma_px: self.settings.pixel_sigma_px * self.widened_by(),
         };
         let nominal = &self.settings.estimator.nominal_camera_from_tanker;
         Ok(self.predictor.points(stamp, nominal, &view))

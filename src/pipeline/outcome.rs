@@ -28,6 +28,8 @@ pub struct FrameOutcome {
     pub track: FrameTrack,
     /// What each cause of the error budget did in this frame; `None` without a budget or a solution.
     pub causes: Option<FrameCauses>,
+    /// What the stated sigmas were multiplied by; 1 where they were taken as they are.
+    pub widened_by: f64,
 }
 
 impl FrameOutcome {
@@ -44,6 +46,7 @@ impl FrameOutcome {
             initialisation: None,
             track: FrameTrack::default(),
             causes: None,
+            widened_by: 1.0,
         }
     }
 
@@ -73,6 +76,7 @@ impl FrameOutcome {
             initialisation,
             track: FrameTrack::default(),
             causes: None,
+            widened_by: 1.0,
         }
     }
 
@@ -93,13 +97,18 @@ impl FrameOutcome {
         self
     }
 
-    /// Returns what there is to say of the frame: the refusal, and what was left out at the edge of the image; often
-    /// nothing.
+    /// Returns what there is to say of the frame: the refusal, what was left out at the edge of the image, and that its
+    /// sigmas were widened; often nothing.
     #[must_use]
     pub fn message(&self) -> String {
         let refusal = self.result.as_ref().err().map(ToString::to_string);
         let left_out = (!self.left_out.ids.is_empty()).then(|| self.left_out.to_string());
-        let parts: Vec<String> = refusal.into_iter().chain(left_out).collect();
+        let widened = (self.widened_by > 1.0).then(|| {
+            let factor = self.widened_by;
+            format!("sigmas were multiplied by {factor:.2}, as residuals scatter (widen_by_sigma_factor)")
+        });
+        let parts = refusal.into_iter().chain(left_out).chain(widened);
+        let parts: Vec<String> = parts.collect();
         parts.join("; ")
     }
 

@@ -107,21 +107,31 @@ impl Residuals {
         ))
     }
 
-    /// Returns what is wrong with sigmas, if they are.
+    /// Returns what is wrong with sigmas, if they are: as stated, whether or not they are widened.
     #[must_use]
-    pub fn sigmas_in_words(&self, sigmas: Option<SigmaFactor>) -> Option<String> {
-        let sigmas = sigmas.filter(SigmaFactor::is_settled)?;
-        let SigmaFactor { factor, span_s, .. } = sigmas;
+    pub fn sigmas_in_words(&self, sigmas: Option<SigmaFactor>, widened_by: f64) -> Option<String> {
         let which = "the sigmas (pixel_sigma_px, or those of the detections)";
-        if factor > WRONG_BY {
+        let now = if widened_by > 1.0 {
+            format!(
+                "Detections count with {widened_by:.2} times their sigmas (widen_by_sigma_factor), for what scatters from \
+                 frame to frame, until you state larger ones"
+            )
+        } else {
+            "Covariances are too small by that factor squared".to_owned()
+        };
+        let Some(sigmas) = sigmas.filter(SigmaFactor::is_settled) else {
+            let is_widened = widened_by > WRONG_BY;
+            return is_widened.then(|| format!("{which} are too small. {now}"));
+        };
+        let SigmaFactor { factor, span_s, .. } = sigmas;
+        if factor.max(widened_by) > WRONG_BY {
             let cause = if self.is_systematic() {
                 SAME_WAY
             } else {
                 "they scatter about zero"
             };
             Some(format!(
-                "{which} are too small: over {span_s:.0} s residuals were {factor:.1} times as large as they say, and {cause}. \
-                 Covariances are too small by that factor squared"
+                "{which} are too small: over {span_s:.0} s residuals were {factor:.1} times as large as they say, and {cause}. {now}"
             ))
         } else if factor < 1.0 / WRONG_BY {
             Some(format!(
@@ -255,7 +265,9 @@ mod tests {
             "{words}"
         );
         assert!(words.contains("next is marker 4"), "{words}");
-        let sigmas = residuals.sigmas_in_words(Some(by(2.0))).expect("twice");
+        let sigmas = residuals
+            .sigmas_in_words(Some(by(2.0)), 1.0)
+            .expect("twice");
         assert!(sigmas.contains("the marker map or the"), "{sigmas}");
 
         let good = |_| (true, vec![at(3, 0.1, 0.1)]);
@@ -291,15 +303,19 @@ mod tests {
             (1.25, false),
             (1.5, true),
         ] {
-            let words = residuals.sigmas_in_words(Some(by(of)));
+            let words = residuals.sigmas_in_words(Some(by(of)), 1.0);
             assert_eq!(words.is_some(), wrong, "{words:?}");
         }
-        let words = residuals.sigmas_in_words(Some(by(1.5))).unwrap_or_default();
+        let words = residuals
+            .sigmas_in_words(Some(by(1.5)), 1.0)
+            .unwrap_or_default();
         assert!(
             words.contains("too small") && words.contains("1.5 times"),
             "{words}"
         );
-        let words = residuals.sigmas_in_words(Some(by(0.5))).unwrap_or_default();
+        let words = residuals
+            .sigmas_in_words(Some(by(0.5)), 1.0)
+            .unwrap_or_default();
         assert!(
             words.contains("too large") && words.contains("0.50 times"),
             "{words}"
@@ -308,8 +324,22 @@ mod tests {
             fits: 99,
             ..by(2.0)
         };
-        assert_eq!(residuals.sigmas_in_words(Some(early)), None);
-        assert_eq!(residuals.sigmas_in_words(None), None);
+        assert_eq!(residuals.sigmas_in_words(Some(early), 1.0), None);
+        assert_eq!(residuals.sigmas_in_words(None, 1.0), None);
+    }
+
+    #[test]
+    fn widened_sigmas_stay_a_fault_that_names_the_factor() {
+        let residuals = Residuals::default();
+        for sigmas in [Some(by(2.0)), Some(by(1.0)), None] {
+            let words = residuals.sigmas_in_words(sigmas, 1.96).unwrap_or_default();
+            let expected = "Detections count with 1.96 times their sigmas (widen_by_sigma_factor)";
+            assert!(
+                words.contains("too small") && words.contains(expected),
+                "{words}"
+            );
+        }
+        assert_eq!(residuals.sigmas_in_words(Some(by(1.1)), 1.1), None);
     }
 
     #[test]

@@ -257,10 +257,13 @@ impl Watch {
     }
 
     fn watch_sigmas(&mut self, pipeline: &Pipeline, now: Instant) {
-        let sigmas = pipeline.sigma_factor();
+        let (sigmas, widened_by) = (pipeline.sigma_factor(), pipeline.widened_by());
         for (fault, words) in [
             (Fault::NotTrusted, self.residuals.in_words(sigmas)),
-            (Fault::Sigma, self.residuals.sigmas_in_words(sigmas)),
+            (
+                Fault::Sigma,
+                self.residuals.sigmas_in_words(sigmas, widened_by),
+            ),
         ] {
             match words {
                 Some(words) => self.faults.see(fault, &words, now),
