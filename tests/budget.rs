@@ -10,12 +10,13 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, SMatrix, Vector3};
 use rand::RngExt;
 use rayon::prelude::*;
 use support::tanker_markers;
-use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo, Ray};
+use tanker_pose::camera::{CalibrationBudget, CalibrationChange, Camera, CameraInfo, Ray};
 use tanker_pose::estimation::{
     CalibrationMode, CauseKind, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Observation,
     Refinement, Solution,
 };
 use tanker_pose::geometry::{pose_error, skew};
+use tanker_pose::pipeline::modes_of_file;
 use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
 use tanker_pose::target::{Marker, MarkerMap};
 
@@ -278,6 +279,37 @@ fn worlds_drawn_from_the_budget_are_covered() {
                 assert!(means.trusted >= 99.5, "{name}: {}", means.trusted);
                 assert!(means.beyond_30 <= 0.3, "{name}: {}", means.beyond_30);
             }
+        }
+    }
+}
+
+/// A longer lens with less distortion fits the same board.
+const CORRELATED: &str = "covariance:
+  parameters: [fx, fy, cx, cy, k1]
+  data:
+    - [9.0, 8.9, 0.3, 0.0, -0.054]
+    - [8.9, 9.0, 0.3, 0.0, -0.054]
+    - [0.3, 0.3, 4.0, 0.5, 0.0]
+    - [0.0, 0.0, 0.5, 4.0, 0.0]
+    - [-0.054, -0.054, 0.0, 0.0, 0.0004]
+";
+
+#[test]
+fn correlated_covariance_of_a_calibration_is_covered() {
+    let file = CalibrationBudget::from_yaml(CORRELATED, "c.yaml").expect("a good file");
+    let paper = include_str!("../config/cameras/paper.yaml");
+    let (info, _) = CameraInfo::from_yaml(paper, "paper.yaml").expect("a good file");
+    let modes = modes_of_file(&file, &info, &paper_camera()).expect("the same lens");
+    let budget = ErrorBudget::new(&[], vec![], modes, 0.5).expect("a budget");
+    for count in [6, 12] {
+        let markers = tanker_markers(count);
+        for range_m in [15, 30] {
+            let name = format!("{count:2} points, {range_m} m, covariance of the calibration");
+            let with_budget = estimator(budget.clone());
+            let means = monte_carlo(&markers, range_m, &budget, &with_budget, |_| {}).report(&name);
+            assert!((5.7..6.3).contains(&means.nees), "{name}: {}", means.nees);
+            assert!((93.5..96.5).contains(&means.covered), "{name}");
+            assert!(means.trusted >= 99.5, "{name}: {}", means.trusted);
         }
     }
 }

@@ -67,7 +67,7 @@ impl Flight {
             seed,
             ..ApproachSettings::default()
         };
-        let budget = error_budget(map.budget(), &settings.calibration);
+        let budget = error_budget(map.budget(), &settings.calibration, &[]);
         let approach = Approach::new(route, paper_camera(), map.clone()).in_a_world_of(&budget);
         let (info, _) = CameraInfo::from_yaml(CAMERA, "paper.yaml").expect("a good file");
         let mut pipeline = Pipeline::new(settings, Arc::new(map));

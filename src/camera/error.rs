@@ -52,6 +52,11 @@ pub enum CameraError {
         width: u32,
         height: u32,
     },
+    /// What the calibration may have wrong is told for another kind of lens.
+    #[error(
+        "the calibration's error budget names {name}, which the lens model equidistant does not have"
+    )]
+    BudgetOfOtherLens { name: &'static str },
     /// Width and height stand in each other's place.
     #[error(
         "width {width} and height {height} are exchanged, or belong to another calibration: the principal point \

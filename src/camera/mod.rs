@@ -12,6 +12,7 @@
 //! [`Camera::ray_from_pixel`] and [`Camera::project`] refuse what lies beyond the same limit, found at
 //! construction, instead of returning a ray that is plausible and wrong.
 
+mod budget_file;
 mod calibration;
 mod distortion;
 mod error;
@@ -21,6 +22,7 @@ mod model;
 #[cfg(test)]
 mod tests;
 
+pub use budget_file::{CalibrationBudget, CalibrationBudgetError};
 pub use calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};
 pub use error::{CameraError, UndistortError};
 pub use file::{CameraFileError, CameraFileWarning};

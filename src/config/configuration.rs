@@ -21,6 +21,8 @@ pub struct Configuration {
     pub settings: Settings,
     /// Name of a shipped marker map, or the path of one.
     pub marker_map: String,
+    /// Path of what the calibration may have wrong, in place of sigmas in the settings.
+    pub calibration_budget_file: Option<String>,
     /// Child frame of the published transform.
     pub tanker_frame_id: String,
     /// Whether to publish to /tf.
@@ -71,6 +73,7 @@ impl From<&Parameters> for Configuration {
             expected_attitude: expected_attitude(&values),
             consumers: ConsumerConfiguration::from(&values),
             marker_map: values.marker_map,
+            calibration_budget_file: values.calibration_budget_file,
             tanker_frame_id: values.tanker_frame_id,
             publish_tf: values.publish_tf,
             use_sim_time: values.use_sim_time,
@@ -250,6 +253,7 @@ mod tests {
             ("k1_sigma", Double(0.02)),
             ("k2_sigma", Double(0.01)),
             ("jitter_px", Double(0.4)),
+            ("calibration_budget_file", String("c.yaml".into())),
             ("acceleration_density_mps2", Double(0.3)),
             ("angular_acceleration_density_dps2", Double(5.0)),
             ("manoeuvre_factor", Double(2.0)),
@@ -266,6 +270,7 @@ mod tests {
         );
         assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
         assert!(found.settings.widen_by_sigma_factor);
+        assert_eq!(found.calibration_budget_file.as_deref(), Some("c.yaml"));
         assert!(found.use_sim_time && found.lifecycle && found.publish_predicted_points);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);

@@ -30,7 +30,40 @@ use table::Values;
 /// take away.
 ///
 /// # Errors
-/// [`OutputError`] names the output.
-pub fn check_together(parameters: &Parameters) -> Result<(), OutputError> {
-    ConsumerConfiguration::from(&Values::from(parameters)).check()
+/// [`TogetherError`] names the parameters.
+pub fn check_together(parameters: &Parameters) -> Result<(), TogetherError> {
+    let values = Values::from(parameters);
+    let said_twice = [
+        (KEYS.focal_length_sigma.name(), values.focal_length_sigma),
+        (
+            KEYS.principal_point_sigma_px.name(),
+            values.principal_point_sigma_px,
+        ),
+        (KEYS.k1_sigma.name(), values.k1_sigma),
+        (KEYS.k2_sigma.name(), values.k2_sigma),
+    ]
+    .into_iter()
+    .find(|(_, sigma)| *sigma > 0.0);
+    if let (Some((sigma, _)), Some(_)) = (said_twice, &values.calibration_budget_file) {
+        let file = KEYS.calibration_budget_file.name();
+        return Err(TogetherError::TwoCalibrations { file, sigma });
+    }
+    Ok(ConsumerConfiguration::from(&values).check()?)
+}
+
+/// Why values that are allowed one by one are not so together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TogetherError {
+    /// An output lacks what it needs.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The calibration's errors stand in a file and in a parameter.
+    #[error("{file} and {sigma} both say what the calibration may have wrong: set one of them")]
+    TwoCalibrations {
+        /// The parameter that names the file.
+        file: &'static str,
+        /// A standard deviation above 0.
+        sigma: &'static str,
+    },
 }

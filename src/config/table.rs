@@ -106,6 +106,9 @@ ros2_node::declare_parameters! {
         k1_sigma: f64 = double(0.0, [0.0, 1.0]);
         /// standard deviation of the second coefficient of D
         k2_sigma: f64 = double(0.0, [0.0, 1.0]);
+        /// none, or the path of a YAML file such as config/cameras/budget_example.yaml with the calibration's standard
+        /// deviations or covariance, in place of the four above
+        calibration_budget_file: Option<String> = optional_text().fixed();
         /// standard deviation of a shift of the whole image, in u and in v, that differs in each frame: vibration
         jitter_px: f64 = double(0.0, [0.0, 100.0]).unit("px");
     }

@@ -56,6 +56,29 @@ fn the_track_cannot_be_switched_off_under_an_output_that_needs_it() {
     assert_eq!(set("track", ParameterValue::Bool(true)), Ok(()));
 }
 
+#[test]
+fn a_calibration_has_its_sigmas_from_a_file_or_from_parameters() {
+    let mut parameters = Parameters::new(TABLE);
+    let mut set = |name, value| {
+        parameters.set(name, value).expect("allowed by itself");
+        check_together(&parameters)
+    };
+    let file = ParameterValue::String("c.yaml".into());
+    assert_eq!(set("calibration_budget_file", file), Ok(()));
+    assert_eq!(set("jitter_px", ParameterValue::Double(0.5)), Ok(()));
+    for sigma in [
+        "focal_length_sigma",
+        "principal_point_sigma_px",
+        "k1_sigma",
+        "k2_sigma",
+    ] {
+        let refused = set(sigma, ParameterValue::Double(0.01)).expect_err("both");
+        let words = format!("calibration_budget_file and {sigma} both say");
+        assert!(refused.to_string().contains(&words), "{refused}");
+        assert_eq!(set(sigma, ParameterValue::Double(0.0)), Ok(()));
+    }
+}
+
 /// The compiler is silent about fields of `Values` that nothing reads: they come from a macro of another crate.
 #[test]
 fn every_parameter_is_used() {

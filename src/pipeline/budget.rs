@@ -1,14 +1,20 @@
 //! What map and settings say of their own errors -> the estimator's budget.
 
-use crate::camera::{CalibrationChange, FIRST_COEFFICIENT};
+use crate::camera::{
+    CalibrationBudget, CalibrationChange, Camera, CameraError, CameraInfo, FIRST_COEFFICIENT,
+};
 use crate::config::CalibrationSigmas;
 use crate::estimation::{CalibrationMode, ErrorBudget, FlexMode};
 use crate::target::MapBudget;
 use crate::text::{digits, quoted};
 
-/// Returns the budget of a checked map and checked settings.
+/// Returns the budget of a checked map, checked settings and a calibration's own file.
 #[must_use]
-pub fn error_budget(map: &MapBudget, camera: &CalibrationSigmas) -> ErrorBudget {
+pub fn error_budget(
+    map: &MapBudget,
+    camera: &CalibrationSigmas,
+    of_file: &[CalibrationMode],
+) -> ErrorBudget {
     let flex = map.flex.iter().filter(|flex| flex.sigma_m > 0.0);
     let flex = flex.map(|flex| FlexMode {
         name: flex.name.clone(),
@@ -22,14 +28,33 @@ pub fn error_budget(map: &MapBudget, camera: &CalibrationSigmas) -> ErrorBudget 
     ErrorBudget::of_checked(
         &map.survey_sigma_m,
         flex.collect(),
-        calibration_modes(camera),
+        [calibration_modes(camera), of_file.to_vec()].concat(),
         camera.jitter_px,
     )
 }
 
-/// Returns what map and settings state of their own errors, for people.
+/// Returns what a calibration's own file says, for a camera that was read from `info`.
+///
+/// # Errors
+/// As [`CalibrationBudget::changes`].
+pub fn modes_of_file(
+    file: &CalibrationBudget,
+    info: &CameraInfo,
+    camera: &Camera,
+) -> Result<Vec<CalibrationMode>, CameraError> {
+    let modes = file.changes(info, camera)?.into_iter();
+    Ok(modes
+        .map(|(name, change)| CalibrationMode { name, change })
+        .collect())
+}
+
+/// Returns what map, settings and a calibration's own file state of their own errors, for people.
 #[must_use]
-pub fn budget_in_words(map: &MapBudget, camera: &CalibrationSigmas) -> String {
+pub fn budget_in_words(
+    map: &MapBudget,
+    camera: &CalibrationSigmas,
+    of_file: Option<&CalibrationBudget>,
+) -> String {
     let sigmas = map.survey_sigma_m.iter().map(|(_, sigma)| *sigma);
     let survey = match (sigmas.clone().reduce(f64::min), sigmas.reduce(f64::max)) {
         (Some(least), Some(most)) if (most - least) < 1e-12 => format!("surveyed to {most} m"),
@@ -46,7 +71,10 @@ pub fn budget_in_words(map: &MapBudget, camera: &CalibrationSigmas) -> String {
     } else {
         format!("bends ({})", flex.join(", "))
     };
-    let calibration = if *camera == CalibrationSigmas::default() {
+    let calibration = if let Some(file) = of_file {
+        let jitter = camera.jitter_px;
+        format!("known to {}, jitter {jitter} px", file.in_words())
+    } else if *camera == CalibrationSigmas::default() {
         "taken as exact".to_owned()
     } else {
         let mut parts = vec![
@@ -118,7 +146,7 @@ flex:
             distortion: [0.01, 0.0, 0.0, 0.0, 0.03, 0.0, 0.0, 0.0],
             jitter_px: 0.4,
         };
-        let budget = error_budget(map.budget(), &sigmas);
+        let budget = error_budget(map.budget(), &sigmas, &[]);
         for (id, sigma) in [(1, 0.01), (2, 0.0), (3, 0.01)] {
             assert!((budget.survey_sigma_m(id) - sigma).abs() < f64::EPSILON);
         }
@@ -147,7 +175,7 @@ flex:
 
     #[test]
     fn words_say_what_is_taken_as_exact() {
-        let exact = budget_in_words(&MapBudget::default(), &CalibrationSigmas::default());
+        let exact = budget_in_words(&MapBudget::default(), &CalibrationSigmas::default(), None);
         assert_eq!(
             exact,
             "error budget (1 sigma): markers taken as exact, airframe taken as rigid, calibration taken as exact"
@@ -158,15 +186,20 @@ flex:
             distortion: [0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             ..CalibrationSigmas::default()
         };
-        let words = budget_in_words(map.budget(), &sigmas);
+        let words = budget_in_words(map.budget(), &sigmas, None);
         assert!(words.contains("markers surveyed to 0.01 m"), "{words}");
         assert!(words.contains("airframe bends ("), "{words}");
         assert!(words.contains("D[0] 0.02"), "{words}");
+        let file = CalibrationBudget::from_yaml("sigmas: {fx: 1.5, k1: 0.01}\n", "c.yaml");
+        let exact = CalibrationSigmas::default();
+        let words = budget_in_words(map.budget(), &exact, file.ok().as_ref());
+        let expected = "calibration known to fx 1.50 px, k1 0.01000, jitter 0 px";
+        assert!(words.contains(expected), "{words}");
     }
 
     #[test]
     fn an_exact_map_and_no_sigmas_are_an_empty_budget() {
         let exact = MapBudget::default();
-        assert!(error_budget(&exact, &CalibrationSigmas::default()).is_empty());
+        assert!(error_budget(&exact, &CalibrationSigmas::default(), &[]).is_empty());
     }
 }

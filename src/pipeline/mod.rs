@@ -31,12 +31,14 @@ use std::sync::Arc;
 
 use nalgebra::Rotation3;
 
-use crate::camera::{Camera, CameraError, CameraInfo, OffCentre};
+use crate::camera::{CalibrationBudget, Camera, CameraError, CameraInfo, OffCentre};
 use crate::config::Settings;
-use crate::estimation::{ErrorBudget, EstimateError, Estimator, Initialisation, Observation};
+use crate::estimation::{
+    CalibrationMode, ErrorBudget, EstimateError, Estimator, Initialisation, Observation,
+};
 use crate::target::MarkerMap;
 
-pub use budget::{budget_in_words, error_budget};
+pub use budget::{budget_in_words, error_budget, modes_of_file};
 pub use checks::observe;
 pub use code::OutcomeCode;
 pub use edge::{ImageEdges, LeftOut};
@@ -63,11 +65,24 @@ struct LatchedCamera {
     frame_id: String,
     camera: Result<Camera, CameraError>,
     edges: Option<ImageEdges>,
+    /// What the calibration's own file says.
+    modes: Vec<CalibrationMode>,
 }
 
 impl LatchedCamera {
-    fn new(info: CameraInfo, frame_id: String, rectified: bool) -> Self {
-        let camera = Camera::from_info(&info, rectified);
+    fn new(
+        info: CameraInfo,
+        frame_id: String,
+        rectified: bool,
+        budget: Option<&CalibrationBudget>,
+    ) -> Self {
+        let mut modes = Vec::new();
+        let camera = Camera::from_info(&info, rectified).and_then(|camera| {
+            if let Some(budget) = budget {
+                modes = modes_of_file(budget, &info, &camera)?;
+            }
+            Ok(camera)
+        });
         let edges = camera
             .as_ref()
             .ok()
@@ -77,6 +92,7 @@ impl LatchedCamera {
             frame_id,
             camera,
             edges,
+            modes,
         }
     }
 }
@@ -88,6 +104,7 @@ pub struct Pipeline {
     settings: Settings,
     estimator: Estimator,
     map: Arc<MarkerMap>,
+    calibration: Option<CalibrationBudget>,
     camera: Option<LatchedCamera>,
     /// Rotation of the last trusted pose, with its time.
     previous: Option<(Rotation3<f64>, Stamp)>,
@@ -103,7 +120,7 @@ impl Pipeline {
     #[must_use]
     pub fn new(settings: Settings, map: Arc<MarkerMap>) -> Self {
         Self {
-            estimator: estimator(&settings, &map),
+            estimator: estimator(&settings, &map, None),
             tracker: Tracker::new(settings.track),
             predictor: Predictor::default(),
             suspects: Suspects::default(),
@@ -111,24 +128,39 @@ impl Pipeline {
             widening: Widening::default(),
             settings,
             map,
+            calibration: None,
             camera: None,
             previous: None,
+        }
+    }
+
+    /// Returns the pipeline with what the calibrations of its cameras, from now on, may have wrong.
+    #[must_use]
+    pub fn with_calibration_budget(self, calibration: Option<CalibrationBudget>) -> Self {
+        Self {
+            calibration,
+            ..self
         }
     }
 
     /// Replaces the settings from the next frame on; camera, last attitude and track stay.
     pub fn set_settings(&mut self, settings: Settings) {
         let is_other = settings.estimator != self.settings.estimator
-            || settings.calibration != self.settings.calibration;
-        if is_other {
-            self.estimator = estimator(&settings, &self.map);
-        }
+            || settings.calibration != self.settings.calibration
+            || settings.rectified != self.settings.rectified;
         if settings.rectified != self.settings.rectified {
             // The rectified camera looks elsewhere.
             self.reset();
-            self.camera = self.camera.take().map(|latched| {
-                LatchedCamera::new(latched.info, latched.frame_id, settings.rectified)
-            });
+            let budget = self.calibration.as_ref();
+            self.camera = self
+                .camera
+                .take()
+                .map(|LatchedCamera { info, frame_id, .. }| {
+                    LatchedCamera::new(info, frame_id, settings.rectified, budget)
+                });
+        }
+        if is_other {
+            self.estimator = estimator(&settings, &self.map, self.camera.as_ref());
         }
         if !settings.widen_by_sigma_factor {
             self.widening.forget();
@@ -167,10 +199,17 @@ impl Pipeline {
             // What was seen from there says nothing about here.
             self.reset();
         }
-        let latched =
-            LatchedCamera::new(info.clone(), frame_id.to_owned(), self.settings.rectified);
+        let latched = LatchedCamera::new(
+            info.clone(),
+            frame_id.to_owned(),
+            self.settings.rectified,
+            self.calibration.as_ref(),
+        );
         let result = latched.camera.as_ref().map(|_| true).map_err(Clone::clone);
-        self.camera = Some(latched);
+        let latched = self.camera.insert(latched);
+        if self.calibration.is_some() {
+            self.estimator = estimator(&self.settings, &self.map, Some(latched));
+        }
         result
     }
 
@@ -316,9 +355,10 @@ impl Pipeline {
     }
 }
 
-fn estimator(settings: &Settings, map: &MarkerMap) -> Estimator {
-    Estimator::new(settings.estimator.clone())
-        .with_budget(error_budget(map.budget(), &settings.calibration))
+fn estimator(settings: &Settings, map: &MarkerMap, camera: Option<&LatchedCamera>) -> Estimator {
+    let of_file = camera.map_or(&[][..], |latched| &latched.modes);
+    let budget = error_budget(map.budget(), &settings.calibration, of_file);
+    Estimator::new(settings.estimator.clone()).with_budget(budget)
 }
 
 /// Returns the outcome of checked observations: the estimate, judged.

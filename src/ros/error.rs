@@ -6,6 +6,8 @@ use super::consumers::ConsumersError;
 use super::names::NamesError;
 use super::participant::{EndpointError, OpenError};
 use super::start_values::StartParameterError;
+use crate::camera::CalibrationBudgetError;
+use crate::config::TogetherError;
 use crate::target::MarkerMapError;
 use crate::text;
 
@@ -33,6 +35,23 @@ pub enum NodeError {
     /// The marker map cannot be used.
     #[error("parameter \"marker_map\": {0}")]
     Map(#[from] MarkerMapError),
+    /// The file of what the calibration may have wrong is missing, or not readable, or not text.
+    #[error(
+        "parameter \"calibration_budget_file\": cannot read {}: {source}",
+        text::path(path)
+    )]
+    CalibrationUnreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file of what the calibration may have wrong cannot be used.
+    #[error("parameter \"calibration_budget_file\": {0}")]
+    Calibration(#[from] CalibrationBudgetError),
+    /// Parameters that exclude each other, or one that needs another.
+    #[error(transparent)]
+    Together(#[from] TogetherError),
     /// An output for refuelling or a flight stack lacks what it needs.
     #[error(transparent)]
     Consumers(#[from] ConsumersError),

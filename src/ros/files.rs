@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::consumers::refuelling_setup;
 use super::error::NodeError;
+use crate::camera::CalibrationBudget;
 use crate::config::Configuration;
 use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
@@ -13,6 +14,8 @@ pub(super) struct Files {
     pub(super) map: MarkerMap,
     /// None where no output needs one.
     pub(super) setup: Option<RefuellingSetup>,
+    /// What the calibration may have wrong, if a file says it.
+    pub(super) calibration: Option<CalibrationBudget>,
 }
 
 impl Files {
@@ -24,6 +27,11 @@ impl Files {
         Ok(Self {
             map: marker_map(&configuration.marker_map)?,
             setup: refuelling_setup(&configuration.consumers)?,
+            calibration: configuration
+                .calibration_budget_file
+                .as_deref()
+                .map(calibration_budget)
+                .transpose()?,
         })
     }
 }
@@ -37,4 +45,12 @@ fn marker_map(name: &str) -> Result<MarkerMap, NodeError> {
     let text = crate::text_file::read(&path)
         .map_err(|source| NodeError::MapUnreadable { path, source })?;
     Ok(MarkerMap::from_yaml(&text, name)?)
+}
+
+/// Returns what the file at this path says of the calibration.
+fn calibration_budget(name: &str) -> Result<CalibrationBudget, NodeError> {
+    let path = PathBuf::from(name);
+    let text = crate::text_file::read(&path)
+        .map_err(|source| NodeError::CalibrationUnreadable { path, source })?;
+    Ok(CalibrationBudget::from_yaml(&text, name)?)
 }

@@ -7,7 +7,6 @@ use ros2_client::NodeOptions;
 use super::LOG_TARGET;
 use super::arguments::Arguments;
 use super::clock::NodeClock;
-use super::consumers::ConsumersError;
 use super::environment::Environment;
 pub use super::error::NodeError;
 use super::files::Files;
@@ -53,10 +52,7 @@ pub fn run_until(
     let (names, mut start) = effective_parameters(arguments)?;
     let configuration = Configuration::from(&start.parameters);
     // What is wrong with fixed parameters, no transition can mend.
-    configuration
-        .consumers
-        .check()
-        .map_err(ConsumersError::from)?;
+    config::check_together(&start.parameters)?;
     start.leave_topics(&topics::opened(&names, &configuration)?);
     // A managed node reads its files when it is configured.
     let files = if configuration.lifecycle {

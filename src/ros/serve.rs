@@ -21,8 +21,9 @@ use super::outputs::Outputs;
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
 use super::topics::{self, ATTITUDE};
+use crate::camera::CalibrationBudget;
 use crate::config::Configuration;
-use crate::pipeline::Pipeline;
+use crate::pipeline::{Pipeline, budget_in_words};
 use crate::target::MarkerMap;
 use crate::text;
 
@@ -279,14 +280,19 @@ impl<'a> Server<'a> {
                 outputs
             }
         };
-        self.introduce(configuration, &files.map);
-        let mut handler = self.handler(configuration, files.map, outputs)?;
+        self.introduce(configuration, &files.map, files.calibration.as_ref());
+        let mut handler = self.handler(configuration, files.map, files.calibration, outputs)?;
         handler.understand(configuration);
         self.work = Work::Ready(Box::new(handler));
         Ok(())
     }
 
-    fn introduce(&self, configuration: &Configuration, map: &MarkerMap) {
+    fn introduce(
+        &self,
+        configuration: &Configuration,
+        map: &MarkerMap,
+        calibration: Option<&CalibrationBudget>,
+    ) {
         let names = self.ros.names();
         log::info!(
             "{} in domain {}, marker map {} with {} markers",
@@ -296,6 +302,8 @@ impl<'a> Server<'a> {
             map.markers().len(),
         );
         log::info!("{}", topics::introduction(names, configuration));
+        let sigmas = &configuration.settings.calibration;
+        log::info!("{}", budget_in_words(map.budget(), sigmas, calibration));
     }
 
     /// Returns what handles the messages, for this configuration and map.
@@ -303,6 +311,7 @@ impl<'a> Server<'a> {
         &self,
         configuration: &Configuration,
         map: MarkerMap,
+        calibration: Option<CalibrationBudget>,
         outputs: Outputs,
     ) -> Result<Handler, NamesError> {
         let map = Arc::new(map);
@@ -311,7 +320,8 @@ impl<'a> Server<'a> {
             map: Arc::clone(&map),
             max_hamming: configuration.max_hamming,
         };
-        let pipeline = Pipeline::new(configuration.settings.clone(), map);
+        let pipeline =
+            Pipeline::new(configuration.settings.clone(), map).with_calibration_budget(calibration);
         let names = self.ros.names();
         let watch = Watch::new(
             names.topic(configuration.input.topic().name)?,

@@ -6,11 +6,13 @@ use std::str::FromStr;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Rotation3;
-use tanker_pose::camera::{CameraFileError, CameraInfo};
+use tanker_pose::camera::{CalibrationBudget, CalibrationBudgetError, CameraFileError, CameraInfo};
 use tanker_pose::config::{
     CalibrationSigmas, KEYS, Key, ParameterValue, Words, nominal_camera_from_tanker,
 };
-use tanker_pose::estimation::{Estimator, EstimatorSettings, Initialisation, Refinement};
+use tanker_pose::estimation::{
+    CalibrationMode, Estimator, EstimatorSettings, Initialisation, Refinement,
+};
 use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
 use tanker_pose::pipeline::error_budget;
 use tanker_pose::target::{MapBudget, MarkerMap};
@@ -79,6 +81,9 @@ pub struct EstimatorOptions {
     /// Standard deviation of the second coefficient of D
     #[arg(long, value_name = "SIGMA", default_value_t = KEYS.k2_sigma.default(), value_parser = double(KEYS.k2_sigma))]
     k2_sigma: f64,
+    /// YAML file with standard deviations or covariance of the calibration, in place of the four above
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["focal_length_sigma", "principal_point_sigma_px", "k1_sigma", "k2_sigma"])]
+    calibration_budget_file: Option<PathBuf>,
     /// Standard deviation of a shift of the whole image that differs in each frame, px
     #[arg(long, value_name = "PX", default_value_t = KEYS.jitter_px.default(), value_parser = double(KEYS.jitter_px))]
     jitter_px: f64,
@@ -111,8 +116,21 @@ impl EstimatorOptions {
         }
     }
 
-    /// Returns the estimator with the error budget of a map and of the options.
-    pub fn estimator(&self, map: Option<&MarkerMap>) -> Estimator {
+    /// Returns what the file of the options says of the calibration, if they name one.
+    pub fn calibration_budget(&self) -> Result<Option<CalibrationBudget>, CalibrationError> {
+        let Some(path) = &self.calibration_budget_file else {
+            return Ok(None);
+        };
+        let text = text_file::read(path).map_err(|source| CalibrationError::BudgetUnreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let budget = CalibrationBudget::from_yaml(&text, &path.display().to_string())?;
+        Ok(Some(budget))
+    }
+
+    /// Returns the estimator with the error budget of a map, of the options, and of a calibration's own file.
+    pub fn estimator(&self, map: Option<&MarkerMap>, of_file: &[CalibrationMode]) -> Estimator {
         let exact = MapBudget::default();
         let of_map = map.map_or(&exact, MarkerMap::budget);
         let calibration = CalibrationSigmas {
@@ -121,7 +139,7 @@ impl EstimatorOptions {
             distortion: [self.k1_sigma, self.k2_sigma, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             jitter_px: self.jitter_px,
         };
-        Estimator::new(self.settings()).with_budget(error_budget(of_map, &calibration))
+        Estimator::new(self.settings()).with_budget(error_budget(of_map, &calibration, of_file))
     }
 }
 
@@ -140,7 +158,7 @@ fn word<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
 }
 
 /// Returns a parser of what the parameter of the same name allows.
-fn double(key: Key<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
+pub fn double(key: Key<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
     parser(key, ParameterValue::Double)
 }
 
@@ -181,6 +199,13 @@ pub enum CalibrationError {
     },
     #[error("cannot use the camera's calibration: {0}")]
     File(#[from] CameraFileError),
+    #[error("cannot read what the calibration may have wrong, {}: {source}", path.display())]
+    BudgetUnreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("cannot use what the calibration may have wrong: {0}")]
+    Budget(#[from] CalibrationBudgetError),
 }
 
 /// Returns the camera info of a calibration file; what was assumed or passed over is logged.

@@ -30,8 +30,8 @@ pub use causes::{Cause, CauseKind, FrameCauses};
 pub(super) use frame::{AttitudePrior, FrameBudget};
 pub(super) use in_doubt::InDoubt;
 
-/// Most modes of calibration and jitter together.
-const MAX_IMAGE_MODES: usize = 12;
+/// Most modes of calibration and jitter together: all numbers of a calibration, and a shake in u and in v.
+const MAX_IMAGE_MODES: usize = CALIBRATION_SIZE + 2;
 /// Most modes of all kinds.
 const MAX_MODES: usize = MAX_FLEX_MODES + MAX_IMAGE_MODES;
 

@@ -117,7 +117,7 @@ impl ApproachOptions {
             });
         }
         let calibration = CalibrationSigmas::default();
-        Ok(Some(error_budget(map.budget(), &calibration)))
+        Ok(Some(error_budget(map.budget(), &calibration, &[])))
     }
 
     const fn settings(&self) -> ApproachSettings {

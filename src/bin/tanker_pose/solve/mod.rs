@@ -12,9 +12,11 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 use nalgebra::{Point3, Rotation3};
-use tanker_pose::camera::{Camera, CameraError, CameraInfo};
+use tanker_pose::camera::{CalibrationBudget, Camera, CameraError, CameraInfo};
 use tanker_pose::estimation::Estimator;
-use tanker_pose::pipeline::{self, Detection, FrameOutcome, ImageEdges, Refusal, observe};
+use tanker_pose::pipeline::{
+    self, Detection, FrameOutcome, ImageEdges, Refusal, modes_of_file, observe,
+};
 use tanker_pose::target::MarkerMap;
 
 use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
@@ -128,7 +130,9 @@ fn read_line(input: &mut impl BufRead, line: &mut Vec<u8>, number: u64) -> Resul
 type Sight = (Camera, ImageEdges);
 
 struct Solver {
+    options: EstimatorOptions,
     estimator: Estimator,
+    calibration_budget: Option<CalibrationBudget>,
     map: Option<MarkerMap>,
     calibration: Option<CameraInfo>,
     rectified: bool,
@@ -147,7 +151,9 @@ impl Solver {
             .transpose()
             .map_err(SolveError::MarkerMap)?;
         Ok(Self {
-            estimator: arguments.estimator.estimator(map.as_ref()),
+            estimator: arguments.estimator.estimator(map.as_ref(), &[]),
+            calibration_budget: arguments.estimator.calibration_budget()?,
+            options: arguments.estimator.clone(),
             map,
             calibration: arguments
                 .camera
@@ -272,9 +278,13 @@ impl Solver {
         let rectified = self.rectified;
         let known = self.camera.take().filter(|(known, _)| *known == info);
         let (_, sight) = self.camera.insert(known.unwrap_or_else(|| {
-            let sight = Camera::from_info(&info, rectified).map(|camera| {
+            let sight = Camera::from_info(&info, rectified).and_then(|camera| {
+                if let Some(budget) = &self.calibration_budget {
+                    let modes = modes_of_file(budget, &info, &camera)?;
+                    self.estimator = self.options.estimator(self.map.as_ref(), &modes);
+                }
                 let edges = ImageEdges::new(&info, &camera, rectified);
-                (camera, edges)
+                Ok((camera, edges))
             });
             (info, sight)
         }));

@@ -1,0 +1,518 @@
+//! What a calibration may have wrong, from a file: standard deviations, or a whole covariance.
+
+use nalgebra::DMatrix;
+use serde::Deserialize;
+use serde_saphyr::Spanned;
+
+use super::calibration::{CalibrationChange, FIRST_COEFFICIENT};
+use super::distortion::Lens;
+use super::{Camera, CameraError, CameraInfo};
+use crate::text::quoted;
+use crate::yaml::{self, Place, YamlError};
+
+/// What a file may name, in `OpenCV`'s order of the coefficients.
+const NAMES: [&str; 12] = [
+    "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
+];
+/// Of these, how many are pixels.
+const PIXELS: usize = 4;
+/// Largest standard deviation of focal length and principal point, px: beyond it, it is not one of a calibration.
+const MAX_PX: f64 = 100.0;
+/// Largest standard deviation of a coefficient; far ones are large where a lens says little about them.
+const MAX_COEFFICIENT: f64 = 1000.0;
+/// Share of a standard deviation's square below which it is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// What a calibration may have wrong, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationBudget {
+    /// Places in [`NAMES`].
+    parameters: Vec<usize>,
+    /// A factor of the covariance, in the file's units: each column is what one cause does at one sigma.
+    columns: Vec<Vec<f64>>,
+    /// What each column is called: the first parameter that it moves.
+    names: Vec<String>,
+}
+
+/// Why a file says nothing about a calibration; each message begins with the place at fault.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "a variant's message names its fields")]
+pub enum CalibrationBudgetError {
+    /// No YAML, or not in the file's shape.
+    #[error(transparent)]
+    Yaml(#[from] YamlError),
+    /// Neither kind of numbers, or both.
+    #[error("{place}: expected either sigmas or covariance")]
+    NotOne { place: Place },
+    /// A parameter that calibrations do not have.
+    #[error("{place}: expected one of {}, got {}", NAMES.join(", "), quoted(name))]
+    UnknownName { place: Place, name: String },
+    /// A parameter that stands twice.
+    #[error("{place}: {name} stands twice")]
+    Twice { place: Place, name: &'static str },
+    /// Rows that make no square matrix.
+    #[error(
+        "{place}: data must be {need} rows of {need} numbers, one for each parameter, got {got}"
+    )]
+    Size {
+        place: Place,
+        need: usize,
+        got: String,
+    },
+    /// A number that is no standard deviation.
+    #[error("{place}: the sigma of {name} must be 0 to {most}, got {value}")]
+    Sigma {
+        place: Place,
+        name: &'static str,
+        most: f64,
+        value: f64,
+    },
+    /// A matrix that differs from its transpose.
+    #[error(
+        "{place}: data must be symmetric, but has {above} for {row} with {column} and {below} for {column} with {row}"
+    )]
+    NotSymmetric {
+        place: Place,
+        row: &'static str,
+        column: &'static str,
+        above: f64,
+        below: f64,
+    },
+    /// A symmetric matrix that is no covariance.
+    #[error(
+        "{place}: data must be positive semidefinite, but has the eigenvalue {least:.3} (of the correlations)"
+    )]
+    Indefinite { place: Place, least: f64 },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    sigmas: Option<RawSigmas>,
+    covariance: Option<RawCovariance>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields, default)]
+struct RawSigmas {
+    fx: Option<Spanned<f64>>,
+    fy: Option<Spanned<f64>>,
+    cx: Option<Spanned<f64>>,
+    cy: Option<Spanned<f64>>,
+    k1: Option<Spanned<f64>>,
+    k2: Option<Spanned<f64>>,
+    p1: Option<Spanned<f64>>,
+    p2: Option<Spanned<f64>>,
+    k3: Option<Spanned<f64>>,
+    k4: Option<Spanned<f64>>,
+    k5: Option<Spanned<f64>>,
+    k6: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawCovariance {
+    parameters: Vec<Spanned<String>>,
+    data: Spanned<Vec<Spanned<Vec<f64>>>>,
+}
+
+impl CalibrationBudget {
+    /// Returns what a file says: `sigmas` by name, or `covariance` with `parameters` and the rows of a matrix (`data`);
+    /// px for fx, fy, cx and cy, of the raw image.
+    ///
+    /// # Errors
+    /// [`CalibrationBudgetError`] with the place of the value at fault.
+    ///
+    /// ```
+    /// use tanker_pose::camera::CalibrationBudget;
+    ///
+    /// let text = include_str!("../../config/cameras/budget_example.yaml");
+    /// let budget = CalibrationBudget::from_yaml(text, "budget_example.yaml")?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn from_yaml(text: &str, source: &str) -> Result<Self, CalibrationBudgetError> {
+        let raw: Raw = yaml::read(text, source)?;
+        match (raw.sigmas, raw.covariance) {
+            (Some(sigmas), None) => sigmas.checked(source),
+            (None, Some(covariance)) => covariance.checked(source),
+            _ => Err(CalibrationBudgetError::NotOne {
+                place: Place::whole(source),
+            }),
+        }
+    }
+
+    /// Returns each cause by its name, with the change that it makes at one sigma of a camera that was read from `info`.
+    ///
+    /// # Errors
+    /// [`CameraError::BudgetOfOtherLens`] where the lens has not the coefficient that the file names.
+    pub fn changes(
+        &self,
+        info: &CameraInfo,
+        camera: &Camera,
+    ) -> Result<Vec<(String, CalibrationChange)>, CameraError> {
+        let is_equidistant = matches!(camera.lens, Some(Lens::Equidistant(_)));
+        // Of the raw image; a camera info for rectified images may have none.
+        let of_raw = |k: f64, used: f64| if k > 0.0 { k } else { used };
+        let (fx, fy) = (of_raw(info.k[0], camera.fx), of_raw(info.k[4], camera.fy));
+        let places: Vec<(usize, f64)> = self
+            .parameters
+            .iter()
+            .map(|&parameter| {
+                Ok(match parameter {
+                    0 => (0, 1.0 / fx),
+                    1 => (1, 1.0 / fy),
+                    // Pixels of the image that detections come in: binned, or rectified.
+                    2 => (2, camera.fx / fx),
+                    3 => (3, camera.fy / fy),
+                    _ => (
+                        FIRST_COEFFICIENT + coefficient(parameter, is_equidistant)?,
+                        1.0,
+                    ),
+                })
+            })
+            .collect::<Result<_, CameraError>>()?;
+        let changes = self.names.iter().zip(&self.columns).map(|(name, column)| {
+            let mut change = CalibrationChange::zeros();
+            for ((place, unit), value) in places.iter().zip(column) {
+                change[*place] += unit * value;
+            }
+            (name.clone(), change)
+        });
+        Ok(changes.collect())
+    }
+
+    /// Returns the standard deviation of each parameter, for people.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let parts: Vec<String> = self
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(row, &parameter)| {
+                let squares = self.columns.iter().map(|column| column[row].powi(2));
+                let unit = if parameter < PIXELS { " px" } else { "" };
+                let sigma = crate::text::digits(squares.sum::<f64>().sqrt());
+                format!("{} {sigma}{unit}", NAMES[parameter])
+            })
+            .collect();
+        parts.join(", ")
+    }
+
+    /// Returns the budget of a checked covariance: its lower triangular factor, without the columns that are zero.
+    fn of_covariance(
+        parameters: Vec<usize>,
+        sigmas: &[f64],
+        covariance: &DMatrix<f64>,
+        place: Place,
+    ) -> Result<Self, CalibrationBudgetError> {
+        let count = parameters.len();
+        let of = |sigma: f64| if sigma > 0.0 { 1.0 / sigma } else { 0.0 };
+        let mut correlations = DMatrix::from_fn(count, count, |i, j| {
+            covariance[(i, j)] * of(sigmas[i]) * of(sigmas[j])
+        });
+        // What is exact goes with nothing.
+        let is_stray = |i: usize| sigmas[i] == 0.0 && covariance.row(i).amax() > 0.0;
+        let least = if (0..count).any(is_stray) {
+            covariance.symmetric_eigenvalues().min()
+        } else if count > 0 {
+            correlations.symmetric_eigenvalues().min()
+        } else {
+            0.0
+        };
+        if least < -ROUNDING * count as f64 {
+            return Err(CalibrationBudgetError::Indefinite { place, least });
+        }
+        let (mut columns, mut names) = (Vec::new(), Vec::new());
+        for pivot in 0..count {
+            let square = correlations[(pivot, pivot)];
+            if square <= ROUNDING {
+                continue;
+            }
+            let column = correlations.column(pivot) / square.sqrt();
+            correlations -= &column * column.transpose();
+            let own = column.iter().zip(sigmas).enumerate();
+            let own =
+                own.map(|(row, (value, sigma))| if row < pivot { 0.0 } else { value * sigma });
+            columns.push(own.collect());
+            names.push(NAMES[parameters[pivot]].to_owned());
+        }
+        Ok(Self {
+            parameters,
+            columns,
+            names,
+        })
+    }
+}
+
+impl RawSigmas {
+    fn checked(self, source: &str) -> Result<CalibrationBudget, CalibrationBudgetError> {
+        let all = [
+            self.fx, self.fy, self.cx, self.cy, self.k1, self.k2, self.p1, self.p2, self.k3,
+            self.k4, self.k5, self.k6,
+        ];
+        let (mut parameters, mut sigmas) = (Vec::new(), Vec::new());
+        for (parameter, sigma) in all.iter().enumerate() {
+            if let Some(sigma) = sigma {
+                let place = Place::at(source, sigma.referenced);
+                parameters.push(parameter);
+                sigmas.push(checked_sigma(parameter, sigma.value, place)?);
+            }
+        }
+        let squares = sigmas.iter().map(|sigma| sigma * sigma);
+        let covariance =
+            DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(sigmas.len(), squares));
+        CalibrationBudget::of_covariance(parameters, &sigmas, &covariance, Place::whole(source))
+    }
+}
+
+impl RawCovariance {
+    fn checked(self, source: &str) -> Result<CalibrationBudget, CalibrationBudgetError> {
+        let mut parameters = Vec::with_capacity(self.parameters.len().min(NAMES.len()));
+        for name in self.parameters {
+            let place = Place::at(source, name.referenced);
+            let Some(parameter) = NAMES.iter().position(|known| *known == name.value) else {
+                let name = name.value;
+                return Err(CalibrationBudgetError::UnknownName { place, name });
+            };
+            if parameters.contains(&parameter) {
+                let name = NAMES[parameter];
+                return Err(CalibrationBudgetError::Twice { place, name });
+            }
+            parameters.push(parameter);
+        }
+        let need = parameters.len();
+        let place = Place::at(source, self.data.referenced);
+        let rows = self.data.value;
+        let size = |place: Place, got: String| CalibrationBudgetError::Size { place, need, got };
+        if rows.len() != need {
+            return Err(size(place, format!("{} rows", rows.len())));
+        }
+        if let Some(row) = rows.iter().find(|row| row.value.len() != need) {
+            let got = format!("a row of {}", row.value.len());
+            return Err(size(Place::at(source, row.referenced), got));
+        }
+        let covariance = DMatrix::from_fn(need, need, |i, j| rows[i].value[j]);
+        let mut sigmas = Vec::with_capacity(need);
+        for (i, row) in rows.iter().enumerate() {
+            let place = Place::at(source, row.referenced);
+            let variance = covariance[(i, i)];
+            // The root of what is negative is not a number, and refused as such.
+            sigmas.push(checked_sigma(parameters[i], variance.sqrt(), place)?);
+        }
+        for (i, row) in rows.iter().enumerate() {
+            for j in 0..i {
+                let (below, above) = (covariance[(i, j)], covariance[(j, i)]);
+                let is_symmetric = (below - above).abs() <= 1e-6 * sigmas[i] * sigmas[j];
+                if !is_symmetric {
+                    return Err(CalibrationBudgetError::NotSymmetric {
+                        place: Place::at(source, row.referenced),
+                        row: NAMES[parameters[j]],
+                        column: NAMES[parameters[i]],
+                        above,
+                        below,
+                    });
+                }
+            }
+        }
+        let covariance = (&covariance + covariance.transpose()) * 0.5;
+        CalibrationBudget::of_covariance(parameters, &sigmas, &covariance, place)
+    }
+}
+
+fn checked_sigma(
+    parameter: usize,
+    value: f64,
+    place: Place,
+) -> Result<f64, CalibrationBudgetError> {
+    let most = if parameter < PIXELS {
+        MAX_PX
+    } else {
+        MAX_COEFFICIENT
+    };
+    if (0.0..=most).contains(&value) {
+        return Ok(value);
+    }
+    Err(CalibrationBudgetError::Sigma {
+        place,
+        name: NAMES[parameter],
+        most,
+        value,
+    })
+}
+
+/// Returns the place of a coefficient in D.
+fn coefficient(parameter: usize, is_equidistant: bool) -> Result<usize, CameraError> {
+    let index = parameter - PIXELS;
+    if !is_equidistant {
+        return Ok(index);
+    }
+    // k1, k2, k3 and k4, without tangential ones.
+    match NAMES[parameter] {
+        "k1" => Ok(0),
+        "k2" => Ok(1),
+        "k3" => Ok(2),
+        "k4" => Ok(3),
+        name => Err(CameraError::BudgetOfOtherLens { name }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(model: &str, d: &[f64], binning: u32) -> (CameraInfo, Camera) {
+        let info = CameraInfo {
+            width: 1280,
+            height: 960,
+            distortion_model: model.to_owned(),
+            d: d.to_vec(),
+            k: [900.0, 0.0, 640.0, 0.0, 800.0, 480.0, 0.0, 0.0, 1.0],
+            binning_x: binning,
+            binning_y: binning,
+            ..CameraInfo::default()
+        };
+        let camera = Camera::from_info(&info, false).expect("a usual lens");
+        (info, camera)
+    }
+
+    fn changes(text: &str, model: &str, d: &[f64]) -> Vec<(String, CalibrationChange)> {
+        let (info, camera) = camera(model, d, 1);
+        let budget = CalibrationBudget::from_yaml(text, "c.yaml").expect("a good file");
+        budget.changes(&info, &camera).expect("the same lens")
+    }
+
+    fn refusal(text: &str) -> String {
+        let refused = CalibrationBudget::from_yaml(text, "c.yaml");
+        refused.expect_err("this file is wrong").to_string()
+    }
+
+    #[test]
+    fn sigmas_are_one_cause_each_and_those_of_zero_none() {
+        let found = changes("sigmas: {fy: 1.6, cx: 2, k3: 0.5, k1: 0}\n", "", &[]);
+        let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["fy", "cx", "k3"]);
+        for ((_, change), (place, value)) in found.iter().zip([(1, 0.002), (2, 2.0), (8, 0.5)]) {
+            let mut expected = CalibrationChange::zeros();
+            expected[place] = value;
+            assert!((change - expected).norm() < 1e-15, "{change}");
+        }
+    }
+
+    #[test]
+    fn a_covariance_is_that_of_its_causes() {
+        let text = "covariance:
+  parameters: [fx, k1, cx, fy]
+  data:
+    - [4, 0.012, 0, 3.9]
+    - [0.012, 0.0001, 0, 0.011]
+    - [0, 0, 1, 0]
+    - [3.9, 0.011, 0, 4]
+";
+        let found = changes(text, "plumb_bob", &[-0.2, 0.05, 0.0, 0.0, 0.0]);
+        let sum = found.iter().fold(
+            nalgebra::SMatrix::<f64, 12, 12>::zeros(),
+            |sum, (_, change)| sum + change * change.transpose(),
+        );
+        let places = [(0, 1.0 / 900.0), (4, 1.0), (2, 1.0), (1, 1.0 / 800.0)];
+        let rows = [
+            [4.0, 0.012, 0.0, 3.9],
+            [0.012, 1e-4, 0.0, 0.011],
+            [0.0, 0.0, 1.0, 0.0],
+            [3.9, 0.011, 0.0, 4.0],
+        ];
+        for (row, (i, by)) in rows.iter().zip(places) {
+            for (value, (j, with)) in row.iter().zip(places) {
+                let off = (sum[(i, j)] - value * by * with).abs();
+                assert!(off < 1e-12, "{i} {j}: {off}");
+            }
+        }
+        // The principal point, which nothing else goes with, is a cause by itself: jitter joins it.
+        let alone = found.iter().find(|(name, _)| name == "cx").expect("there");
+        assert_eq!(alone.1.iter().filter(|value| **value != 0.0).count(), 1);
+    }
+
+    #[test]
+    fn a_singular_covariance_has_fewer_causes() {
+        let text = "covariance: {parameters: [fx, fy], data: [[1, 1], [1, 1]]}\n";
+        assert_eq!(changes(text, "", &[]).len(), 1);
+    }
+
+    #[test]
+    fn coefficients_stand_where_the_lens_has_them_and_binned_pixels_are_larger() {
+        let found = changes("sigmas: {k3: 0.5}\n", "equidistant", &[0.0; 4]);
+        assert!((found[0].1[FIRST_COEFFICIENT + 2] - 0.5).abs() < 1e-15);
+        let (info, fisheye) = camera("equidistant", &[0.0; 4], 2);
+        let budget = CalibrationBudget::from_yaml("sigmas: {p1: 0.001}\n", "c.yaml");
+        let refused = budget.expect("a good file").changes(&info, &fisheye);
+        assert_eq!(refused, Err(CameraError::BudgetOfOtherLens { name: "p1" }));
+        let budget = CalibrationBudget::from_yaml("sigmas: {cx: 2, fx: 9}\n", "c.yaml");
+        let found = budget.expect("a good file").changes(&info, &fisheye);
+        let found = found.expect("the same lens");
+        let [focal, centre] = [&found[0], &found[1]];
+        assert!((focal.1[0] - 0.01).abs() < 1e-15 && (centre.1[2] - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn every_slip_is_refused_at_its_line() {
+        let of = |parameters: &str, data: &str| {
+            format!("covariance:\n  parameters: {parameters}\n  data: {data}\n")
+        };
+        let slips = [
+            (
+                "{}\n".to_owned(),
+                "c.yaml: expected either sigmas or covariance",
+            ),
+            (
+                format!("sigmas: {{fx: 1}}\n{}", of("[fx]", "[[1]]")),
+                "c.yaml: expected either sigmas or covariance",
+            ),
+            ("sigmas: {f: 1}\n".to_owned(), "unknown key \"f\""),
+            (
+                "sigmas:\n  fx: -1\n".to_owned(),
+                "c.yaml:2:7: the sigma of fx must be 0 to 100, got -1",
+            ),
+            (
+                "sigmas: {cy: .nan}\n".to_owned(),
+                "the sigma of cy must be 0 to 100, got NaN",
+            ),
+            (
+                of("[fx, f]", "[[1]]"),
+                "c.yaml:2:20: expected one of fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6, got \"f\"",
+            ),
+            (of("[fx, fx]", "[[1]]"), "c.yaml:2:20: fx stands twice"),
+            (
+                of("[fx, fy]", "[[1, 0]]"),
+                "c.yaml:3:9: data must be 2 rows of 2 numbers, one for each parameter, got 1 rows",
+            ),
+            (
+                of("[fx, fy]", "[[1, 0], [1]]"),
+                "c.yaml:3:18: data must be 2 rows of 2 numbers, one for each parameter, got a row of 1",
+            ),
+            (
+                of("[fx, fy]", "[[1, 0], [0, -1]]"),
+                "the sigma of fy must be 0 to 100, got NaN",
+            ),
+            (
+                of("[fx, k1]", "[[1, 0.1], [0.2, 1]]"),
+                "data must be symmetric, but has 0.1 for fx with k1 and 0.2 for k1 with fx",
+            ),
+            (
+                of("[fx, k1]", "[[1, 2], [2, 1]]"),
+                "c.yaml:3:9: data must be positive semidefinite, but has the eigenvalue -1.000",
+            ),
+            (
+                of("[fx, k1]", "[[1, .nan], [.nan, 1]]"),
+                "data must be symmetric",
+            ),
+            (
+                of("[fx, k1]", "[[1, 0.1], [0.1, 0]]"),
+                "data must be positive semidefinite",
+            ),
+        ];
+        for (text, expected) in slips {
+            let found = refusal(&text);
+            assert!(found.contains(expected), "{text}: {found}");
+        }
+    }
+}
