@@ -214,6 +214,38 @@ fn points_along_the_wings_help_and_along_the_fin_hardly() {
     assert!(wings < 0.84 && fin > 0.86, "wings {wings}, fin {fin}");
 }
 
+/// Standard errors with N = 500: 0.155 of a NEES of 6, 1 % of a coverage of 95 %.
+#[test]
+fn departures_are_covered_with_the_budget_and_not_without() {
+    let (one, two) = (directory("departures_one"), directory("departures_two"));
+    let arguments = ["departures", "--trials", "500"];
+    let result = reproduce(&arguments, &one, 1);
+    reproduce(&arguments, &two, 2);
+    let names = [
+        "departures.csv",
+        "departures_coverage.svg",
+        "departures_nees.svg",
+    ];
+    let (one, two) = (files(&one), files(&two));
+    assert!(one.iter().map(|(name, _)| name.as_str()).eq(names));
+    assert!(one == two, "files differ between one and two threads");
+    let points = result["departures"].as_array().expect("points");
+    assert!(points.len() >= 6 * 7);
+    for point in points {
+        let told = &point["budget"];
+        let (nees, covered) = (number(&told["nees"]), number(&told["covered"]));
+        // Linear: 0.6 m are bent a little too far.
+        assert!((5.2..6.9).contains(&nees), "{point:#}");
+        assert!((0.9..0.99).contains(&covered), "{point:#}");
+    }
+    for largest in points.iter().filter(|point| {
+        let of = |other: &&Value| other["departure"] == point["departure"];
+        points.iter().rfind(of) == Some(point)
+    }) {
+        assert!(number(&largest["exact"]["nees"]) > 15.0, "{largest:#}");
+    }
+}
+
 #[test]
 fn a_directory_that_cannot_be_made_is_named() {
     let out = directory("blocked");

@@ -236,7 +236,7 @@ fn over_bound(point: &Point, method: Method) -> f64 {
         .map_or(f64::NAN, |s| s.rotation_rms_deg / point.bound.rotation_deg)
 }
 
-fn solid(color: RGBColor) -> Style {
+pub fn solid(color: RGBColor) -> Style {
     Style {
         color,
         line: Line::Solid,
@@ -244,7 +244,7 @@ fn solid(color: RGBColor) -> Style {
     }
 }
 
-fn dashed(color: RGBColor) -> Style {
+pub fn dashed(color: RGBColor) -> Style {
     Style {
         color,
         line: Line::Dashed,

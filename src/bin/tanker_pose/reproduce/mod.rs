@@ -1,7 +1,9 @@
-//! `tanker_pose reproduce`: the experiments of the paper's section 4, as tables and plots.
+//! `tanker_pose reproduce`: the experiments of the paper's section 4, and worlds that depart from what is believed, as
+//! tables and plots.
 //!
 //! The settings are the library's ([`Experiment`]); here are threads, files and pictures.
 
+mod departures;
 mod error;
 mod figure;
 mod monte_carlo;
@@ -18,7 +20,6 @@ use clap::ValueEnum;
 use tanker_pose::simulation::Experiment;
 
 pub use error::ReproduceError;
-use monte_carlo::Outcome;
 
 /// Images of the single approach drawn beside Fig. 8.
 const RUN_IMAGES_A_SECOND: f64 = 2.0;
@@ -59,7 +60,10 @@ enum What {
     Iterations,
     /// The iteration stopped after few steps
     Stopped,
-    /// Everything
+    /// Worlds that differ from map, calibration and sigma, with the error budget and without; not the paper's, and not part
+    /// of `all`
+    Departures,
+    /// Everything of the paper
     All,
 }
 
@@ -69,6 +73,9 @@ pub fn run(arguments: &Arguments) -> Result<(), ReproduceError> {
         path: arguments.out.clone(),
         source,
     })?;
+    if arguments.what == What::Departures {
+        return run_departures(arguments, begin);
+    }
     let wanted = arguments.what.experiments();
     let outcomes = monte_carlo::run(&wanted, arguments.trials, arguments.seed)?;
     let mut files = Vec::new();
@@ -87,33 +94,52 @@ pub fn run(arguments: &Arguments) -> Result<(), ReproduceError> {
             files.push(draw(&arguments.out, "fig8_run", &approach.figure())?);
         }
     }
-    print(arguments, &outcomes, &files, begin).or_else(|error| match error.kind() {
-        // The reader has seen enough, as `head` does: not a fault.
-        std::io::ErrorKind::BrokenPipe => Ok(()),
-        _ => Err(ReproduceError::Print(error)),
-    })
+    let texts = outcomes.iter().map(report::text);
+    let json = || report::json(&outcomes, &files, arguments.seed);
+    print(arguments, texts, json, &files, begin)
+}
+
+fn run_departures(arguments: &Arguments, begin: Instant) -> Result<(), ReproduceError> {
+    let Arguments {
+        out, trials, seed, ..
+    } = arguments;
+    let points = departures::run(*trials, *seed);
+    let mut files = vec![write(out, "departures.csv", &departures::csv(&points))?];
+    for (name, figure) in departures::figures(&points, *trials) {
+        files.push(draw(out, name, &figure)?);
+    }
+    let text = departures::text(&points, *trials);
+    let json = || departures::json(&points, &files, *seed);
+    print(arguments, [text].into_iter(), json, &files, begin)
 }
 
 fn print(
     arguments: &Arguments,
-    outcomes: &[Outcome],
+    texts: impl Iterator<Item = String>,
+    json: impl FnOnce() -> serde_json::Value,
     files: &[PathBuf],
     begin: Instant,
-) -> std::io::Result<()> {
+) -> Result<(), ReproduceError> {
     let mut stdout = std::io::stdout().lock();
-    if arguments.json {
-        let seed = arguments.seed;
-        return writeln!(stdout, "{:#}", report::json(outcomes, files, seed));
+    let print = move || {
+        if arguments.json {
+            return writeln!(stdout, "{:#}", json());
+        }
+        for text in texts {
+            writeln!(stdout, "{text}")?;
+        }
+        let seconds = begin.elapsed().as_secs_f64();
+        writeln!(stdout, "{seconds:.0} s, files:")?;
+        for file in files {
+            writeln!(stdout, "  {}", file.display())?;
+        }
+        Ok(())
+    };
+    match print() {
+        // The reader has seen enough, as `head` does: not a fault.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.map_err(ReproduceError::Print),
     }
-    for outcome in outcomes {
-        writeln!(stdout, "{}", report::text(outcome))?;
-    }
-    let seconds = begin.elapsed().as_secs_f64();
-    writeln!(stdout, "{seconds:.0} s, files:")?;
-    for file in files {
-        writeln!(stdout, "  {}", file.display())?;
-    }
-    Ok(())
 }
 
 fn write(directory: &Path, name: &str, text: &str) -> Result<PathBuf, ReproduceError> {
@@ -143,6 +169,7 @@ impl What {
             Self::Minima => vec![Experiment::minima()],
             Self::Iterations => vec![Experiment::iterations()],
             Self::Stopped => vec![Experiment::stopped()],
+            Self::Departures => Vec::new(),
             Self::All => Experiment::all(),
         }
     }

@@ -29,6 +29,7 @@ pub struct Panel {
     pub y: Axis,
 }
 
+#[derive(Clone)]
 pub struct Curve {
     pub points: Vec<(f64, f64)>,
     pub style: Style,

@@ -16,6 +16,8 @@ pub enum Axis {
     FromZero,
     /// The powers of ten about all values.
     Logarithmic,
+    /// From the first to the second, by powers of ten; a value beyond them is drawn on the edge.
+    Decades(f64, f64),
     /// These limits; a value beyond them is drawn on the edge.
     Within(f64, f64),
 }
@@ -38,6 +40,7 @@ impl Scale {
                 Self::linear(0.0, 1.08 * max)
             }
             Axis::Within(min, max) => Self::linear(min, max),
+            Axis::Decades(min, max) => Self::logarithmic(min, max),
             Axis::Logarithmic => {
                 let positive = finite.filter(|value| *value > 0.0);
                 let min = positive.clone().fold(f64::MAX, f64::min);
