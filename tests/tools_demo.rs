@@ -48,6 +48,31 @@ fn short_demo_gives_every_frame_an_outcome_and_honest_statistics() {
 }
 
 #[test]
+fn demo_in_a_drawn_world_is_honest_about_it() {
+    let output = tool(5)
+        .args(["demo", "--duration-s", "4", "--json", "--draw-tanker"])
+        .args(["--marker-map", "config/tankers/budget_example.yaml"])
+        .args(["--focal-length-sigma", "0.003", "--jitter-px", "0.3"])
+        .args(["--principal-point-sigma-px", "2", "--k1-sigma", "0.01"])
+        .output()
+        .expect("the tool was just built");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let summary: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(summary["missing"], Value::from(0));
+    assert_eq!(summary["injected"]["taken_for_good"], Value::from(0));
+    let nees = &summary["nees"];
+    assert_eq!(nees["one_draw"], Value::Bool(true));
+    let number = |value: &Value| value.as_f64().expect("there are estimates");
+    let interval = &nees["expected_interval_95"];
+    let (low, high) = (number(&interval[0]), number(&interval[1]));
+    assert!((1.2..1.3).contains(&low) && (14.0..15.0).contains(&high));
+    // Without the budget it would be some hundreds.
+    let mean = number(&nees["mean"]);
+    assert!(low < mean && mean < high, "{summary}");
+}
+
+#[test]
 fn demo_ends_in_good_order_when_interrupted() {
     let child = tool(1)
         .args(["demo", "--json"])

@@ -53,12 +53,17 @@ impl Live {
     }
 
     /// Says what will happen.
-    pub fn introduce(&self, environment: &Environment) {
+    pub fn introduce(&self, environment: &Environment, world: Option<String>) {
         self.say(&format!(
             "Simulated approach: {}\n\
              Node /tanker_pose and its sensor talk over DDS on loopback, domain {}.",
             self.what, environment.domain_id
         ));
+        if let Some(world) = world {
+            self.say(&format!(
+                "Tanker and camera are drawn from what the node is told of their errors.\n{world}"
+            ));
+        }
     }
 
     /// Says that the node was found.

@@ -61,11 +61,11 @@ pub struct Arguments {
 
 /// Runs the demo to its end, or until SIGINT or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
-    let (approach, camera_info) = arguments.approach.read(false)?;
+    let (approach, camera_info) = arguments.approach.read()?;
     let map = arguments.approach.map()?;
     check_marker_count(&map)?;
     let environment = domain::environment(arguments.domain_id)?;
-    let ros_arguments = node_arguments(&arguments.approach.marker_map)?;
+    let ros_arguments = node_arguments(&arguments.approach)?;
     // From here on a signal is kept until it is read, and ends both nodes in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(DemoError::Signals)?;
     if arguments.verbose {
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
         &arguments.approach,
         &approach,
     );
-    live.introduce(&environment);
+    live.introduce(&environment, arguments.approach.world_in_words(&map));
 
     let faults_on = (!arguments.no_faults).then_some(&map);
     let patience = Duration::from_secs_f64(arguments.wait_s);
@@ -96,7 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
         Err(DemoError::NodeGone) => node_ended.and(Err(DemoError::NodeGone)),
         flown => flown,
     }?;
-    report(flight.ledger(), end, arguments.json)
+    let is_one_draw = arguments.approach.has_lasting_errors();
+    report(flight.ledger(), end, is_one_draw, arguments.json)
 }
 
 /// The node runs with its defaults.
@@ -113,12 +114,12 @@ fn check_marker_count(map: &MarkerMap) -> Result<(), DemoError> {
     Ok(())
 }
 
-fn report(ledger: &Ledger, end: End, json: bool) -> Result<(), DemoError> {
+fn report(ledger: &Ledger, end: End, is_one_draw: bool, json: bool) -> Result<(), DemoError> {
     let interrupted = end == End::Interrupted;
     if interrupted && ledger.sent() == 0 {
         return Ok(());
     }
-    let summary = Summary::new(ledger, interrupted);
+    let summary = Summary::new(ledger, interrupted, is_one_draw);
     summary.print(json);
     match summary.missing() {
         0 => Ok(()),
@@ -129,10 +130,15 @@ fn report(ledger: &Ledger, end: End, json: bool) -> Result<(), DemoError> {
     }
 }
 
-/// What the node is told: as on its own command line, the defaults but for the marker map.
-fn node_arguments(marker_map: &str) -> Result<RosArguments, ArgumentError> {
-    let words = ["--ros-args", "-p"].map(str::to_owned);
+/// What the node is told: as on its own command line, the defaults but for the marker map, and what the camera of a drawn
+/// world may have wrong.
+fn node_arguments(approach: &ApproachOptions) -> Result<RosArguments, ArgumentError> {
+    let mut words = vec!["--ros-args".to_owned(), "-p".to_owned()];
     // Quoted, so that a path that looks like a number stays text.
-    let marker_map = format!("marker_map:='{}'", marker_map.replace('\'', "''"));
-    Ok(RosArguments::split(&[&words[..], &[marker_map]].concat())?.0)
+    let path = approach.marker_map.replace('\'', "''");
+    words.push(format!("marker_map:='{path}'"));
+    for (name, value) in approach.parameters() {
+        words.extend(["-p".to_owned(), format!("{name}:={value:?}")]);
+    }
+    Ok(RosArguments::split(&words)?.0)
 }

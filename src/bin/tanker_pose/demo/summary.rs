@@ -62,6 +62,8 @@ struct Nees {
     mean: Option<f64>,
     expected: f64,
     expected_interval_95: Option<[f64; 2]>,
+    /// Survey, flex or calibration are off for the whole flight: its mean is about one draw.
+    one_draw: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -73,7 +75,12 @@ struct Times {
 
 impl Summary {
     /// Returns the numbers of a flight.
-    pub fn new(ledger: &Ledger, interrupted: bool) -> Self {
+    ///
+    /// # Inputs
+    /// * `is_one_draw`: whether something is off for the whole of it. Its mean NEES then is a weighted sum of six squared
+    ///   normal numbers of which none weighs more than 1, plus the mean of what is drawn for each frame. With all
+    ///   weights 1 it varies most: as the NEES of a single frame.
+    pub fn new(ledger: &Ledger, interrupted: bool, is_one_draw: bool) -> Self {
         let trusted: Vec<&Estimate> = ledger.frames().filter_map(Frame::trusted).collect();
         let nees: Vec<f64> = trusted.iter().map(|estimate| estimate.nees).collect();
         let refusals_by_outcome = refusals(ledger);
@@ -93,7 +100,12 @@ impl Summary {
             nees: Nees {
                 mean: mean(&nees),
                 expected: POSE_DEGREES_OF_FREEDOM,
-                expected_interval_95: mean_nees_interval(nees.len()),
+                expected_interval_95: mean_nees_interval(if is_one_draw {
+                    nees.len().min(1)
+                } else {
+                    nees.len()
+                }),
+                one_draw: is_one_draw,
             },
             latency_ms: Times::new(&ledger.latencies_ms()),
             solve_time_ms: Times::new(&solve_time_ms),
@@ -243,11 +255,16 @@ impl Display for Summary {
             )?;
         }
         let [low, high] = self.nees.expected_interval_95.unwrap_or([f64::NAN; 2]);
+        let (mean, expected) = (self.nees.mean.unwrap_or(f64::NAN), self.nees.expected);
+        let honest = if self.nees.one_draw {
+            format!("honest ones give {expected} on average over worlds, and in 95 % of them")
+        } else {
+            format!("an honest one gives {expected} (95 %:")
+        };
+        let end = if self.nees.one_draw { "" } else { ")" };
         writeln!(
             out,
-            "  covariance  mean NEES {:.2}; an honest one gives {} (95 %: {low:.2} to {high:.2})",
-            self.nees.mean.unwrap_or(f64::NAN),
-            self.nees.expected
+            "  covariance  mean NEES {mean:.2}; {honest} {low:.2} to {high:.2}{end}"
         )?;
         writeln!(
             out,

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tanker_pose::camera::{Camera, CameraError, CameraInfo};
-use tanker_pose::config::CalibrationSigmas;
+use tanker_pose::config::{CalibrationSigmas, KEYS};
 use tanker_pose::estimation::ErrorBudget;
-use tanker_pose::pipeline::error_budget;
+use tanker_pose::pipeline::{budget_in_words, error_budget};
 use tanker_pose::simulation::{Approach, ApproachSettings};
-use tanker_pose::target::MarkerMap;
+use tanker_pose::target::{MapBudget, MarkerMap};
 
-use crate::options::{self, CalibrationError};
+use crate::options::{self, CalibrationError, double};
 use crate::ros_options::between;
 
 /// The camera of the paper, for those who name none.
@@ -45,10 +45,32 @@ pub struct ApproachOptions {
     /// Amplitude of roll, pitch and yaw relative to the receiver, degrees
     #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = between(0.0, 180.0))]
     attitude_deg: f64,
-    /// Seed of noise, motion, faults and tanker
+    /// Seed of noise, motion, faults and world
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Draw the true tanker from the map's `sigma` and `flex`: markers are not where the map has them, and the airframe
+    /// moves
+    #[arg(long, help_heading = WORLD)]
+    draw_tanker: bool,
+    /// The true focal length is off the calibration's by a share that is drawn with this standard deviation
+    #[arg(long, help_heading = WORLD, value_name = "SHARE", default_value_t = 0.0, value_parser = double(KEYS.focal_length_sigma))]
+    focal_length_sigma: f64,
+    /// The same of each coordinate of the principal point, px
+    #[arg(long, help_heading = WORLD, value_name = "PX", default_value_t = 0.0, value_parser = double(KEYS.principal_point_sigma_px))]
+    principal_point_sigma_px: f64,
+    /// The same of the first coefficient of D
+    #[arg(long, help_heading = WORLD, value_name = "SIGMA", default_value_t = 0.0, value_parser = double(KEYS.k1_sigma))]
+    k1_sigma: f64,
+    /// The same of the second coefficient of D
+    #[arg(long, help_heading = WORLD, value_name = "SIGMA", default_value_t = 0.0, value_parser = double(KEYS.k2_sigma))]
+    k2_sigma: f64,
+    /// The image shakes: each is shifted as a whole, with this standard deviation, px
+    #[arg(long, help_heading = WORLD, value_name = "PX", default_value_t = 0.0, value_parser = double(KEYS.jitter_px))]
+    jitter_px: f64,
 }
+
+/// Above the options of a world that differs from what is published about it.
+const WORLD: &str = "World";
 
 /// Why there is no such approach.
 #[derive(Debug, thiserror::Error)]
@@ -70,9 +92,8 @@ pub enum ApproachError {
 impl ApproachOptions {
     /// Returns the approach, and the camera info that goes with it.
     ///
-    /// # Inputs
-    /// * `draw_tanker`: whether markers and airframe differ from the map, as its `sigma` and `flex` say.
-    pub fn read(&self, draw_tanker: bool) -> Result<(Approach, CameraInfo), ApproachError> {
+    /// The camera info is what the world's camera is drawn about.
+    pub fn read(&self) -> Result<(Approach, CameraInfo), ApproachError> {
         let info = match &self.camera {
             None => {
                 CameraInfo::from_yaml(PAPER_CAMERA, "paper.yaml")
@@ -82,10 +103,10 @@ impl ApproachOptions {
             Some(path) => options::calibration(path)?,
         };
         let map = self.map()?;
-        let budget = self.budget(&map, draw_tanker)?;
+        let budget = self.budget(&map)?;
         let camera = Camera::from_info(&info, false)?;
         let mut approach = Approach::new(self.settings(), camera, map);
-        if let Some(budget) = budget {
+        if !budget.is_empty() {
             approach = approach.in_a_world_of(&budget);
         }
         if approach.frame_count() == 0 {
@@ -102,22 +123,65 @@ impl ApproachOptions {
         options::marker_map(&self.marker_map).map_err(ApproachError::MarkerMap)
     }
 
-    /// Returns what the tanker is drawn from, if it is.
-    fn budget(
-        &self,
-        map: &MarkerMap,
-        draw_tanker: bool,
-    ) -> Result<Option<ErrorBudget>, ApproachError> {
-        if !draw_tanker {
-            return Ok(None);
-        }
-        if map.budget().is_exact() {
+    /// Returns what the world is drawn from; nothing unless an option says so.
+    fn budget(&self, map: &MarkerMap) -> Result<ErrorBudget, ApproachError> {
+        let exact = MapBudget::default();
+        let of_map = if self.draw_tanker {
+            map.budget()
+        } else {
+            &exact
+        };
+        if self.draw_tanker && of_map.is_exact() {
             return Err(ApproachError::ExactMap {
                 name: self.marker_map.clone(),
             });
         }
-        let calibration = CalibrationSigmas::default();
-        Ok(Some(error_budget(map.budget(), &calibration, &[])))
+        Ok(error_budget(of_map, &self.calibration(), &[]))
+    }
+
+    /// Returns what the camera is drawn from.
+    fn calibration(&self) -> CalibrationSigmas {
+        CalibrationSigmas {
+            focal_length: self.focal_length_sigma,
+            principal_point_px: self.principal_point_sigma_px,
+            distortion: [self.k1_sigma, self.k2_sigma, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            jitter_px: self.jitter_px,
+        }
+    }
+
+    /// Returns the node's parameters that say what the camera is drawn from.
+    pub fn parameters(&self) -> [(&'static str, f64); 5] {
+        [
+            (KEYS.focal_length_sigma.name(), self.focal_length_sigma),
+            (
+                KEYS.principal_point_sigma_px.name(),
+                self.principal_point_sigma_px,
+            ),
+            (KEYS.k1_sigma.name(), self.k1_sigma),
+            (KEYS.k2_sigma.name(), self.k2_sigma),
+            (KEYS.jitter_px.name(), self.jitter_px),
+        ]
+    }
+
+    /// Returns whether something is off for the whole flight, so that its frames' errors are not independent.
+    pub fn has_lasting_errors(&self) -> bool {
+        let unshaken = CalibrationSigmas {
+            jitter_px: 0.0,
+            ..self.calibration()
+        };
+        self.draw_tanker || unshaken != CalibrationSigmas::default()
+    }
+
+    /// Returns what the world is drawn from, for people; `None` where it is as published.
+    pub fn world_in_words(&self, map: &MarkerMap) -> Option<String> {
+        let is_drawn = self.has_lasting_errors() || self.jitter_px > 0.0;
+        let exact = MapBudget::default();
+        let of_map = if self.draw_tanker {
+            map.budget()
+        } else {
+            &exact
+        };
+        is_drawn.then(|| budget_in_words(of_map, &self.calibration(), None))
     }
 
     const fn settings(&self) -> ApproachSettings {

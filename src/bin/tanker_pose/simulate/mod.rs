@@ -59,10 +59,6 @@ pub struct Arguments {
     /// How far, px
     #[arg(long, value_name = "PX", default_value_t = 40.0, help_heading = "Faults", value_parser = between(0.0, 10000.0))]
     gross_error_px: f64,
-    /// Draw the true tanker from the map's `sigma` and `flex`: markers are not where the map has them, and the airframe
-    /// moves
-    #[arg(long, help_heading = "Faults")]
-    draw_tanker: bool,
     #[command(flatten)]
     approach: ApproachOptions,
 }
@@ -96,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
     let environment = Environment::from_process()?;
     let names = NodeNames::new(NODE_NAME, &ros_arguments.remaps)?;
     let warnings = check_no_parameters(&ros_arguments, &names)?;
-    let (approach, camera_info) = arguments.approach.read(arguments.draw_tanker)?;
+    let (approach, camera_info) = arguments.approach.read()?;
     // From here on a signal is kept until it is read, and ends the node in good order.
     let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(SimulateError::Signals)?;
     let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, NodeOptions::new())?;
