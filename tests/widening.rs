@@ -164,6 +164,25 @@ fn sigmas_twice_too_small_are_widened_to_the_true_ones() {
     assert!((5.5..6.5).contains(&after), "{after}");
 }
 
+/// Errors that last for nine images: in ten seconds there are some thirty new ones, and the factor is known to 8 %.
+#[test]
+fn errors_of_a_detector_that_last_for_some_images_are_widened_too() {
+    for seed in 0..6 {
+        let mut flight = Flight::paper(1.0, true, seed);
+        let route = ApproachSettings {
+            sigma_px: 2.0 * SIGMA_PX,
+            noise_time_constant_s: 0.3,
+            seed,
+            ..ApproachSettings::default()
+        };
+        let map = MarkerMap::shipped("paper").expect("shipped");
+        flight.approach = Approach::new(route, paper_camera(), map);
+        let [least, most] = flight.pass(|_, _| ()).factors();
+        println!("seed {seed}, errors of 0.3 s: factor {least:.2} to {most:.2}");
+        assert!(least > 1.4 && most < 2.6, "{least} {most}");
+    }
+}
+
 #[test]
 fn sigmas_that_are_right_or_too_large_are_left_as_they_are() {
     for noise in [0.5, 1.0] {

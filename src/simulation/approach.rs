@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 use super::{Scene, World, pose_in_camera};
 use crate::camera::Camera;
@@ -25,6 +26,10 @@ pub struct ApproachSettings {
     pub rate_hz: f64,
     /// Noise of the detector on columns and rows, px.
     pub sigma_px: f64,
+    /// How long an error of a detection lasts, s (a Gauss–Markov process of first order); 0: it is another in each image.
+    pub noise_time_constant_s: f64,
+    /// Gusts: root mean square of the relative acceleration to the left and upwards, each, m/s².
+    pub gust_mps2: f64,
     /// Amplitude of the relative attitude on each axis, degrees.
     pub attitude_deg: f64,
     /// Seed of the noise and of the motion's phases.
@@ -41,6 +46,8 @@ impl Default for ApproachSettings {
             duration_s: 25.0,
             rate_hz: 30.0,
             sigma_px: 0.5,
+            noise_time_constant_s: 0.0,
+            gust_mps2: 0.0,
             attitude_deg: 3.0,
             seed: 1,
         }
@@ -54,8 +61,17 @@ const SWAY_M: f64 = 0.4;
 /// s; periods of sway, roll, pitch and yaw: air behind a tanker, without a common multiple.
 const PERIODS_S: [f64; 4] = [11.0, 5.3, 7.1, 8.7];
 
+/// s; periods of gusts to the left and upwards, without a common multiple.
+const GUSTS_S: [f64; 4] = [0.7, 1.1, 1.9, 3.1];
+
 /// Stream of the generator that draws the world; images have those from 1 on.
 const WORLD_STREAM: u64 = u64::MAX;
+/// About this stream are those of lasting noise.
+const NOISE_STREAM: u64 = 1 << 41;
+/// Time constants after which an error is forgotten to a thousandth.
+const NOISE_MEMORY: f64 = 7.0;
+/// Most images that an error is made of.
+const MAX_NOISE_IMAGES: f64 = 10_000.0;
 
 /// A seeded approach: the same settings give the same bits.
 #[derive(Debug, Clone)]
@@ -64,6 +80,8 @@ pub struct Approach {
     camera: Camera,
     map: MarkerMap,
     phases: [f64; 4],
+    /// To the left and upwards.
+    gust_phases: [[f64; GUSTS_S.len()]; 2],
     /// Where tanker and camera are not as map and calibration have them.
     world: Option<World>,
 }
@@ -85,11 +103,13 @@ impl Approach {
     pub fn new(settings: ApproachSettings, camera: Camera, map: MarkerMap) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
         let phases = std::array::from_fn(|_| random.random_range(0.0..TAU));
+        let gust_phases = [(); 2].map(|()| GUSTS_S.map(|_| random.random_range(0.0..TAU)));
         Self {
             settings,
             camera,
             map,
             phases,
+            gust_phases,
             world: None,
         }
     }
@@ -126,7 +146,12 @@ impl Approach {
         let truth_camera_from_tanker = self.truth(time_s);
         let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
         random.set_stream(u64::from(index) + 1);
-        let sigma_px = self.settings.sigma_px;
+        let lasting = self.lasting_noise(index);
+        let sigma_px = if lasting.is_empty() {
+            self.settings.sigma_px
+        } else {
+            0.0
+        };
         let seen = match &self.world {
             None => Scene::new(self.camera.clone(), &self.map, truth_camera_from_tanker)
                 .noisy_observations(sigma_px, &mut random),
@@ -138,11 +163,15 @@ impl Approach {
         };
         let detections = seen
             .into_iter()
-            .map(|seen| Detection {
-                id: seen.id,
-                u_px: seen.pixel.u,
-                v_px: seen.pixel.v,
-                sigma_px: self.settings.sigma_px,
+            .map(|seen| {
+                let of_marker = lasting.iter().find(|(id, _)| *id == seen.id);
+                let [u, v] = of_marker.map_or([0.0; 2], |(_, noise)| *noise);
+                Detection {
+                    id: seen.id,
+                    u_px: seen.pixel.u + u,
+                    v_px: seen.pixel.v + v,
+                    sigma_px: self.settings.sigma_px,
+                }
             })
             .filter(|seen| self.is_in_image(seen))
             .collect();
@@ -151,6 +180,49 @@ impl Approach {
             truth_camera_from_tanker,
             detections,
         }
+    }
+
+    /// Returns the noise of each marker where it lasts, px: the sum of what came new in this image and those before, so
+    /// that it is the same in any order.
+    fn lasting_noise(&self, index: u32) -> Vec<(u32, [f64; 2])> {
+        let images = self.settings.noise_time_constant_s * self.settings.rate_hz;
+        // What is no time constant is none.
+        let lasts = images > 0.0;
+        if !lasts {
+            return Vec::new();
+        }
+        let kept = (-1.0 / images).exp();
+        let mut noise: Vec<(u32, [f64; 2])> = (self.map.markers().iter())
+            .map(|marker| (marker.id, [0.0; 2]))
+            .collect();
+        let mut weight_px = self.settings.sigma_px * (1.0 - kept * kept).sqrt();
+        // At most ten thousand.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let reach = (NOISE_MEMORY * images).clamp(1.0, MAX_NOISE_IMAGES) as u64;
+        for back in 0..=reach {
+            let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
+            random.set_stream(NOISE_STREAM + u64::from(index) - back);
+            for (_, noise) in &mut noise {
+                for axis in noise {
+                    let new: f64 = StandardNormal.sample(&mut random);
+                    *axis += weight_px * new;
+                }
+            }
+            weight_px *= kept;
+        }
+        noise
+    }
+
+    /// Returns where gusts have moved the tanker to the left and upwards, m.
+    fn gust(&self, time_s: f64) -> [f64; 2] {
+        self.gust_phases.map(|phases| {
+            let waves = GUSTS_S.iter().zip(phases).map(|(period_s, phase)| {
+                let rate = TAU / period_s;
+                (rate * time_s + phase).sin() / (rate * rate)
+            });
+            let amplitude = self.settings.gust_mps2 * (2.0 / GUSTS_S.len() as f64).sqrt();
+            amplitude * waves.sum::<f64>()
+        })
     }
 
     fn truth(&self, time_s: f64) -> Isometry3<f64> {
@@ -170,8 +242,9 @@ impl Approach {
         let range_m =
             end_range_m + (start_range_m - end_range_m) * 0.5 * (1.0 + (PI * progress).cos());
         let wave = |k: usize| (TAU * time_s / PERIODS_S[k] + self.phases[k]).sin();
+        let [left, up] = self.gust(time_s);
         pose_in_camera(
-            Vector3::new(range_m, SWAY_M * wave(0), CLIMB * range_m),
+            Vector3::new(range_m, SWAY_M * wave(0) + left, CLIMB * range_m + up),
             attitude_deg * wave(1),
             attitude_deg * wave(2),
             attitude_deg * wave(3),
@@ -238,6 +311,53 @@ mod tests {
             squares += amplitude * amplitude / 2000.0;
         }
         assert!((squares - 1.0).abs() < 0.1, "{squares}");
+    }
+
+    /// Twelve numbers a frame, 1500 frames of which every thirtieth is new: 5 % of the variance, 1 % of the correlation.
+    #[test]
+    fn lasting_noise_has_its_sigma_and_its_time_constant_in_any_order() {
+        let lasting = |noise_time_constant_s| {
+            let settings = ApproachSettings {
+                noise_time_constant_s,
+                ..ApproachSettings::default()
+            };
+            let map = MarkerMap::shipped("paper").expect("shipped");
+            Approach::new(settings, paper_camera(), map)
+        };
+        let [still, exact] = [0.5, 0.0].map(lasting);
+        assert!(exact.lasting_noise(3).is_empty());
+        assert_eq!(still.frame(20), lasting(0.5).frame(20));
+        let noise: Vec<_> = (0..1500).map(|index| still.lasting_noise(index)).collect();
+        let product = |lag: usize| {
+            let pairs = noise.iter().zip(&noise[lag..]);
+            let sum: f64 = pairs
+                .flat_map(|(a, b)| a.iter().zip(b))
+                .map(|((_, a), (_, b))| a[0] * b[0] + a[1] * b[1])
+                .sum();
+            sum / (12 * (noise.len() - lag)) as f64
+        };
+        assert!((product(0) / 0.25 - 1.0).abs() < 0.15, "{}", product(0));
+        // A time constant is fifteen images.
+        let kept = product(15) / product(0);
+        assert!((kept - (-1.0_f64).exp()).abs() < 0.1, "{kept}");
+    }
+
+    #[test]
+    fn gusts_have_their_acceleration() {
+        const STEP_S: f64 = 0.01;
+        let settings = ApproachSettings {
+            gust_mps2: 0.8,
+            ..ApproachSettings::default()
+        };
+        let map = MarkerMap::shipped("paper").expect("shipped");
+        let approach = Approach::new(settings, paper_camera(), map);
+        let mut squares = 0.0;
+        for k in 0..6000_u32 {
+            let at = |step: f64| approach.gust(STEP_S * (f64::from(k) + step))[0];
+            let acceleration = (at(1.0) - 2.0 * at(0.0) + at(-1.0)) / (STEP_S * STEP_S);
+            squares += acceleration * acceleration / 6000.0;
+        }
+        assert!((squares.sqrt() / 0.8 - 1.0).abs() < 0.05, "{squares}");
     }
 
     #[test]

@@ -76,6 +76,7 @@ pub fn approach(seed: u64) -> Vec<Frame> {
         sigma_px: SIGMA_PX,
         attitude_deg: 3.0,
         seed,
+        ..ApproachSettings::default()
     };
     let approach = Approach::new(settings, paper_camera(), map.clone());
     let pose = |k| approach.frame(k).truth_camera_from_tanker;

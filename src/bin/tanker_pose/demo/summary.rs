@@ -62,7 +62,7 @@ struct Nees {
     mean: Option<f64>,
     expected: f64,
     expected_interval_95: Option<[f64; 2]>,
-    /// Survey, flex or calibration are off for the whole flight: its mean is about one draw.
+    /// Something is off for many images: the flight's mean is about one draw.
     one_draw: bool,
 }
 

@@ -42,6 +42,12 @@ pub struct ApproachOptions {
     /// Noise of the detector on columns and rows, px; also what the detections state, and 0 states "not known"
     #[arg(long, value_name = "PX", default_value_t = 0.5, value_parser = between(0.0, 100.0))]
     sigma_px: f64,
+    /// How long an error of a detection lasts, s; 0: it is another in each image
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = between(0.0, 10.0))]
+    noise_time_constant_s: f64,
+    /// Gusts: root mean square of the relative acceleration to the left and upwards, m/s²
+    #[arg(long, value_name = "MPS2", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
+    gust_mps2: f64,
     /// Amplitude of roll, pitch and yaw relative to the receiver, degrees
     #[arg(long, value_name = "DEG", default_value_t = 3.0, value_parser = between(0.0, 180.0))]
     attitude_deg: f64,
@@ -163,18 +169,20 @@ impl ApproachOptions {
         ]
     }
 
-    /// Returns whether something is off for the whole flight, so that its frames' errors are not independent.
+    /// Returns whether something is off for many images, so that their errors are not independent.
     pub fn has_lasting_errors(&self) -> bool {
         let unshaken = CalibrationSigmas {
             jitter_px: 0.0,
             ..self.calibration()
         };
-        self.draw_tanker || unshaken != CalibrationSigmas::default()
+        self.draw_tanker
+            || self.noise_time_constant_s > 0.0
+            || unshaken != CalibrationSigmas::default()
     }
 
     /// Returns what the world is drawn from, for people; `None` where it is as published.
     pub fn world_in_words(&self, map: &MarkerMap) -> Option<String> {
-        let is_drawn = self.has_lasting_errors() || self.jitter_px > 0.0;
+        let is_drawn = self.draw_tanker || self.calibration() != CalibrationSigmas::default();
         let exact = MapBudget::default();
         let of_map = if self.draw_tanker {
             map.budget()
@@ -191,6 +199,8 @@ impl ApproachOptions {
             duration_s: self.duration_s,
             rate_hz: self.rate_hz,
             sigma_px: self.sigma_px,
+            noise_time_constant_s: self.noise_time_constant_s,
+            gust_mps2: self.gust_mps2,
             attitude_deg: self.attitude_deg,
             seed: self.seed,
         }
