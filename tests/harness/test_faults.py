@@ -1,5 +1,6 @@
 """Faults around the node, each provoked and cleared: one log line at either end, `/diagnostics` in between."""
 
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import String
-from tanker_pose.msg import FeaturePointArray
+from tanker_pose.msg import EstimatorStatus, FeaturePointArray
 
 from harness import messages, paper
 from harness.conftest import StartNode
@@ -484,6 +485,22 @@ def test_a_fault_is_said_when_it_begins_and_ends_and_shown_in_between(
     (line,) = scene.lines(f"{case.key} is over after")
     assert "[INFO]" in line
     assert "panicked" not in scene.process.log
+
+
+def test_widened_sigmas_stay_a_fault_and_the_statuses_tell_the_factor(
+    make_scene: Callable[..., Scene],
+) -> None:
+    scene = make_scene("-p", "widen_by_sigma_factor:=true")
+    statuses: list[EstimatorStatus] = scene.peer.collect(EstimatorStatus, "/status")
+    scatter_markers(scene)
+    words = "times their sigmas (widen_by_sigma_factor)"
+    scene.step_until(lambda: words in (scene.fault("sigma") or ""), "sigma shown")
+    scene.steps_for(2.0)
+    latest = statuses[-20:]
+    factors = [float(re.search(r"multiplied by ([0-9.]+)", s.message)[1]) for s in latest]
+    assert 3.2 < min(factors) and max(factors) < 4.8, factors
+    assert sum(s.outcome == EstimatorStatus.OK for s in latest) >= 18
+    assert "are too small" in scene.fault("sigma")
 
 
 @pytest.fixture
