@@ -13,7 +13,6 @@ import sys
 import time
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
 from rclpy.node import Node
 from tanker_pose.msg import ReceptacleState
@@ -54,10 +53,8 @@ def missing(node: Node) -> str:
     return f"nothing on {node.resolve_topic_name(TOPIC)}: {why}"
 
 
-def main() -> None:
-    own = remove_ros_args(sys.argv)[1:]
-    left = int(own[0]) if own else None
-    rclpy.init(args=sys.argv)
+def follow(left: int | None) -> None:
+    """Prints `left` messages, or all until rclpy is shut down."""
     node = rclpy.create_node("closing_speed")
     said_or_heard = time.monotonic()
 
@@ -71,17 +68,26 @@ def main() -> None:
             left -= 1
 
     node.create_subscription(ReceptacleState, TOPIC, show, 10)
+    while left != 0 and rclpy.ok():
+        rclpy.spin_once(node, timeout_sec=1.0)
+        if left != 0 and time.monotonic() - said_or_heard > PATIENCE_S:
+            print(missing(node), file=sys.stderr, flush=True)
+            said_or_heard = time.monotonic()
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def main() -> None:
+    own = remove_ros_args(sys.argv)[1:]
     try:
-        while left != 0:
-            rclpy.spin_once(node, timeout_sec=1.0)
-            if left != 0 and time.monotonic() - said_or_heard > PATIENCE_S:
-                print(missing(node), file=sys.stderr, flush=True)
-                said_or_heard = time.monotonic()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+        rclpy.init(args=sys.argv)
+        try:
+            follow(int(own[0]) if own else None)
+        except Exception:  # Ctrl-C shuts rclpy down, which may fail whatever call is under way
+            if rclpy.ok():
+                raise
+    except KeyboardInterrupt:
+        pass  # Ctrl-C
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import time
 import numpy as np
 import rclpy
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from tanker_pose.msg import EstimatorStatus
 
@@ -45,8 +44,12 @@ class PoseSubscriber(Node):
             self.get_logger().warning(f"no pose for {age:.0f} s")
 
 
-rclpy.init()
 try:
-    rclpy.spin(PoseSubscriber())
-except (KeyboardInterrupt, ExternalShutdownException):
+    rclpy.init()
+    try:
+        rclpy.spin(PoseSubscriber())
+    except Exception:  # Ctrl-C shuts rclpy down, which may fail whatever call is under way
+        if rclpy.ok():
+            raise
+except KeyboardInterrupt:
     pass  # Ctrl-C

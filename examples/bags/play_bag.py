@@ -15,7 +15,6 @@ import time
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from rosbags.highlevel import AnyReader
@@ -76,13 +75,16 @@ def main() -> None:
         parser.error(f"there is no bag at {arguments.bag}")
     if not arguments.rate > 0.0:
         parser.error(f"the rate must be positive, got {arguments.rate}")
-    rclpy.init(args=sys.argv)
     try:
-        print(f"played {play(arguments)} messages")
-    except (KeyboardInterrupt, ExternalShutdownException):
+        rclpy.init(args=sys.argv)
+        try:
+            print(f"played {play(arguments)} messages")
+            rclpy.try_shutdown()
+        except Exception:  # Ctrl-C shuts rclpy down, which may fail whatever call is under way
+            if rclpy.ok():
+                raise
+    except KeyboardInterrupt:
         pass  # Ctrl-C
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

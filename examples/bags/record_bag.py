@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
@@ -68,17 +67,19 @@ def main() -> None:
     arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
     if arguments.bag.exists():
         parser.error(f"{arguments.bag} is there already")
-    rclpy.init(args=sys.argv)
     with Writer(arguments.bag, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        recorder = Recorder(bag, arguments.topics)
+        recorder = None
         try:
-            rclpy.spin(recorder)
-        except (KeyboardInterrupt, ExternalShutdownException):
+            rclpy.init(args=sys.argv)
+            try:
+                recorder = Recorder(bag, arguments.topics)
+                rclpy.spin(recorder)
+            except Exception:  # Ctrl-C shuts rclpy down, which may fail whatever call is under way
+                if rclpy.ok():
+                    raise
+        except KeyboardInterrupt:
             pass  # Ctrl-C
-        finally:
-            print(f"recorded {recorder.count} messages")
-            recorder.destroy_node()
-            rclpy.try_shutdown()
+        print(f"recorded {recorder.count if recorder else 0} messages")
 
 
 if __name__ == "__main__":

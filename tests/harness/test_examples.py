@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import textwrap
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -97,6 +98,32 @@ def test_without_receptacle_the_closing_speed_says_what_is_missing(
     )
     expect("it has a publisher, so the node has no confirmed track")
     closing.stop()
+
+
+@pytest.mark.parametrize("name", ["pose_subscriber", "closing_speed"])
+def test_ctrl_c_ends_a_program_in_python_well_whatever_it_is_doing(
+    name: str, domain: int, tmp_path: Path
+) -> None:
+    # Each prints its imports, so that the moments begin after the last of them: until then Python has no way out but
+    # a traceback.
+    environment = {"PYTHONPROFILEIMPORTTIME": "1"}
+    moments_s = [0.0, 0.02, 0.05, 0.1, 0.2, 0.4]
+    started = [
+        Process(command(name, "python"), domain, tmp_path / f"{name}_{number}", environment)
+        for number in range(len(moments_s))
+    ]
+    try:
+        for process, moment_s in zip(started, moments_s, strict=True):
+            wait_until(
+                lambda: re.search(r"(?m)\| +tanker_pose\.msg$", process.log), "the imports"
+            )
+            time.sleep(moment_s)
+            process.stop()
+            assert "Traceback" not in process.log
+    finally:
+        for process in started:
+            process.kill_if_running()
+            print(f"--- {process.name} ---\n{process.log[-2000:]}")
 
 
 def documented(program: str) -> str:
