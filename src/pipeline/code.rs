@@ -1,102 +1,118 @@
-//! The constants of `tanker_pose/msg/EstimatorStatus`, for everybody who counts or prints outcomes.
+//! The constants of `tanker_pose/msg/EstimatorStatus`, for everything that counts or prints outcomes.
 
-/// What became of a frame, in one word; the number is that of the message's constant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u8)]
-#[allow(missing_docs)] // each is documented in msg/EstimatorStatus.msg
-pub enum OutcomeCode {
-    Ok = 0,
-    NoCameraInfo = 1,
-    InvalidCameraInfo = 2,
-    FrameMismatch = 3,
-    ZeroStamp = 4,
-    UnknownId = 5,
-    DuplicateId = 6,
-    NotFinite = 7,
-    InvalidSigma = 8,
-    OutsideImage = 9,
-    TooFewPoints = 10,
-    DegenerateGeometry = 11,
-    NoConvergence = 12,
-    BehindCamera = 13,
-    NotTrusted = 14,
-    Ambiguous = 15,
+/// Declares an enum of constants: variant, number on the wire and name in one place.
+macro_rules! status_codes {
+    (
+        $(#[$of_enum:meta])*
+        $code:ident
+        $( $(#[$of_variant:meta])* $variant:ident = $number:literal $name:literal, )+
+    ) => {
+        $(#[$of_enum])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[repr(u8)]
+        pub enum $code {
+            $( $(#[$of_variant])* $variant = $number, )+
+        }
+
+        impl $code {
+            /// Every code, in the order of its number.
+            pub const ALL: [Self; [$($number),+].len()] = [$(Self::$variant),+];
+
+            /// Returns the number on the wire.
+            #[must_use]
+            pub const fn number(self) -> u8 {
+                self as u8
+            }
+
+            /// Returns the constant's name, without a prefix that all constants of this enum share.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $( Self::$variant => $name, )+
+                }
+            }
+        }
+    };
 }
 
-impl OutcomeCode {
-    /// Every code, in the order of its number.
-    pub const ALL: [Self; 16] = [
-        Self::Ok,
-        Self::NoCameraInfo,
-        Self::InvalidCameraInfo,
-        Self::FrameMismatch,
-        Self::ZeroStamp,
-        Self::UnknownId,
-        Self::DuplicateId,
-        Self::NotFinite,
-        Self::InvalidSigma,
-        Self::OutsideImage,
-        Self::TooFewPoints,
-        Self::DegenerateGeometry,
-        Self::NoConvergence,
-        Self::BehindCamera,
-        Self::NotTrusted,
-        Self::Ambiguous,
-    ];
+status_codes! {
+    /// The outcome of a frame; the number is that of the message's constant.
+    OutcomeCode
+    /// A pose was published.
+    Ok = 0 "OK",
+    /// No `CameraInfo` has arrived yet.
+    NoCameraInfo = 1 "NO_CAMERA_INFO",
+    /// The latest `CameraInfo` cannot be used.
+    InvalidCameraInfo = 2 "INVALID_CAMERA_INFO",
+    /// `frame_id` is empty or differs from that of the `CameraInfo`.
+    FrameMismatch = 3 "FRAME_MISMATCH",
+    /// The stamp is zero or malformed.
+    ZeroStamp = 4 "ZERO_STAMP",
+    /// An id that the marker map does not have.
+    UnknownId = 5 "UNKNOWN_ID",
+    /// Two detections with the same id.
+    DuplicateId = 6 "DUPLICATE_ID",
+    /// A pixel is NaN or infinite.
+    NotFinite = 7 "NOT_FINITE",
+    /// A sigma is negative, not finite, or too large to use.
+    InvalidSigma = 8 "INVALID_SIGMA",
+    /// A pixel is far outside the image, or where the lens model is not valid.
+    OutsideImage = 9 "OUTSIDE_IMAGE",
+    /// Fewer points than `min_points`, or than the initialisation needs.
+    TooFewPoints = 10 "TOO_FEW_POINTS",
+    /// The points do not determine a pose.
+    DegenerateGeometry = 11 "DEGENERATE_GEOMETRY",
+    /// The solver found no minimum.
+    NoConvergence = 12 "NO_CONVERGENCE",
+    /// The best fit puts a marker behind the camera.
+    BehindCamera = 13 "BEHIND_CAMERA",
+    /// The residuals are too large for the given sigmas.
+    NotTrusted = 14 "NOT_TRUSTED",
+    /// A second pose fits almost as well.
+    Ambiguous = 15 "AMBIGUOUS",
+}
 
-    /// Returns the number on the wire.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self as u8
-    }
-
-    /// Returns the constant's name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "OK",
-            Self::NoCameraInfo => "NO_CAMERA_INFO",
-            Self::InvalidCameraInfo => "INVALID_CAMERA_INFO",
-            Self::FrameMismatch => "FRAME_MISMATCH",
-            Self::ZeroStamp => "ZERO_STAMP",
-            Self::UnknownId => "UNKNOWN_ID",
-            Self::DuplicateId => "DUPLICATE_ID",
-            Self::NotFinite => "NOT_FINITE",
-            Self::InvalidSigma => "INVALID_SIGMA",
-            Self::OutsideImage => "OUTSIDE_IMAGE",
-            Self::TooFewPoints => "TOO_FEW_POINTS",
-            Self::DegenerateGeometry => "DEGENERATE_GEOMETRY",
-            Self::NoConvergence => "NO_CONVERGENCE",
-            Self::BehindCamera => "BEHIND_CAMERA",
-            Self::NotTrusted => "NOT_TRUSTED",
-            Self::Ambiguous => "AMBIGUOUS",
-        }
-    }
+status_codes! {
+    /// What a frame did to the track: the constants `TRACK_…`.
+    TrackCode
+    /// There is no track, or the frame is not for it.
+    None = 0 "NONE",
+    /// Too few poses so far to confirm a track.
+    Candidate = 1 "CANDIDATE",
+    /// The pose agrees with the track and corrected it.
+    Updated = 2 "UPDATED",
+    /// The frame has no pose; the track was predicted to its stamp.
+    Predicted = 3 "PREDICTED",
+    /// The pose contradicts the track and was not used.
+    Gated = 4 "GATED",
+    /// The stamp is that of an earlier frame, or older than the last one used.
+    OutOfOrder = 5 "OUT_OF_ORDER",
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn constants() -> impl Iterator<Item = (&'static str, u8)> {
+        let definition = include_str!("../../msg/EstimatorStatus.msg");
+        definition.lines().filter_map(|line| {
+            let (name, value) = line
+                .split('#')
+                .next()?
+                .strip_prefix("uint8 ")?
+                .split_once('=')?;
+            Some((name.trim(), value.trim().parse().ok()?))
+        })
+    }
+
     #[test]
     fn codes_are_those_of_the_message_definition() {
-        let definition = include_str!("../../msg/EstimatorStatus.msg");
-        let constants: Vec<(String, u8)> = definition
-            .lines()
-            .filter_map(|line| {
-                let (name, value) = line
-                    .split('#')
-                    .next()?
-                    .strip_prefix("uint8 ")?
-                    .split_once('=')?;
-                Some((name.trim().to_owned(), value.trim().parse().ok()?))
-            })
-            .filter(|(name, _)| !name.starts_with("INITIALISATION_") && !name.starts_with("TRACK_"))
-            .collect();
-        let codes: Vec<(String, u8)> = OutcomeCode::ALL
-            .iter()
-            .map(|&code| (code.name().to_owned(), code.number()))
-            .collect();
-        assert_eq!(constants, codes);
+        let outcomes = constants().filter(|(name, _)| {
+            !name.starts_with("INITIALISATION_") && !name.starts_with("TRACK_")
+        });
+        assert!(outcomes.eq(OutcomeCode::ALL.map(|code| (code.name(), code.number()))));
+        let tracks =
+            constants().filter_map(|(name, value)| Some((name.strip_prefix("TRACK_")?, value)));
+        assert!(tracks.eq(TrackCode::ALL.map(|code| (code.name(), code.number()))));
     }
 }

@@ -1,5 +1,6 @@
 //! What one frame did to the track, and its code on the wire.
 
+use super::TrackCode;
 use crate::geometry::Motion;
 use crate::tracking::TrackOutcome;
 
@@ -32,75 +33,5 @@ impl FrameTrack {
             ) => TrackCode::Candidate,
             Some(_) | None => TrackCode::None,
         }
-    }
-}
-
-/// The constants `TRACK_…` of `tanker_pose/msg/EstimatorStatus`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[repr(u8)]
-#[allow(missing_docs)] // each is documented in msg/EstimatorStatus.msg
-pub enum TrackCode {
-    None = 0,
-    Candidate = 1,
-    Updated = 2,
-    Predicted = 3,
-    Gated = 4,
-    OutOfOrder = 5,
-}
-
-impl TrackCode {
-    /// Every code, in the order of its number.
-    pub const ALL: [Self; 6] = [
-        Self::None,
-        Self::Candidate,
-        Self::Updated,
-        Self::Predicted,
-        Self::Gated,
-        Self::OutOfOrder,
-    ];
-
-    /// Returns the number on the wire.
-    #[must_use]
-    pub const fn number(self) -> u8 {
-        self as u8
-    }
-
-    /// Returns the constant's name without its prefix.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "NONE",
-            Self::Candidate => "CANDIDATE",
-            Self::Updated => "UPDATED",
-            Self::Predicted => "PREDICTED",
-            Self::Gated => "GATED",
-            Self::OutOfOrder => "OUT_OF_ORDER",
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn codes_are_those_of_the_message_definition() {
-        let definition = include_str!("../../msg/EstimatorStatus.msg");
-        let constants: Vec<(&str, u8)> = definition
-            .lines()
-            .filter_map(|line| {
-                let (name, value) = line
-                    .split('#')
-                    .next()?
-                    .strip_prefix("uint8 TRACK_")?
-                    .split_once('=')?;
-                Some((name.trim(), value.trim().parse().ok()?))
-            })
-            .collect();
-        let codes: Vec<_> = TrackCode::ALL
-            .iter()
-            .map(|code| (code.name(), code.number()))
-            .collect();
-        assert_eq!(constants, codes);
     }
 }

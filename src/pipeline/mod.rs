@@ -40,10 +40,10 @@ use crate::target::MarkerMap;
 
 pub use budget::{budget_in_words, error_budget, modes_of_file};
 pub use checks::observe;
-pub use code::OutcomeCode;
+pub use code::{OutcomeCode, TrackCode};
 pub use edge::{ImageEdges, LeftOut};
 pub use frame::{Detection, DetectionFrame};
-pub use frame_track::{FrameTrack, TrackCode};
+pub use frame_track::FrameTrack;
 pub use next_image::NextImage;
 pub use outcome::FrameOutcome;
 pub use predict::PredictedPoint;
