@@ -8,55 +8,20 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Point3, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo, Pixel, Ray};
+use tanker_pose::camera::{Pixel, Ray};
 use tanker_pose::estimation::{
-    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Initialisation,
-    Observation, Refinement, fixed_point, iterate_accelerated, iterate_literally,
+    ErrorBudget, Estimator, EstimatorSettings, Initialisation, Refinement, fixed_point,
+    iterate_accelerated, iterate_literally,
 };
 use tanker_pose::geometry::optical_from_body;
 use tanker_pose::refuelling::Region;
-use tanker_pose::simulation::{Scene, paper_camera, paper_scene, pose_in_camera};
-use tanker_pose::target::Marker;
+use tanker_pose::simulation::paper_camera;
 use tanker_pose::tracking::{Filter, FilterSettings};
 
-const SIGMA_PX: f64 = 0.5;
+#[path = "../tests/solver_support/mod.rs"]
+mod solver_support;
 
-fn plumb_bob_camera() -> Camera {
-    let info = CameraInfo {
-        width: 508,
-        height: 412,
-        distortion_model: "plumb_bob".to_owned(),
-        d: vec![-0.28, 0.09, 0.0008, -0.0005, -0.012],
-        k: [571.0, 0.0, 254.0, 0.0, 571.0, 206.0, 0.0, 0.0, 1.0],
-        ..CameraInfo::default()
-    };
-    Camera::from_info(&info, false).expect("a usual lens")
-}
-
-/// A noisy frame 20 m ahead: the paper's markers, or random ones in the tanker's volume.
-fn frame(camera: Camera, count: u32) -> (Camera, Vec<Observation>) {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
-    let pose = pose_in_camera(Vector3::new(20.0, 0.0, 6.0), 3.0, 2.0, -3.0);
-    let markers = if count == 6 {
-        paper_scene().markers().to_vec()
-    } else {
-        (1..=count)
-            .map(|id| Marker {
-                id,
-                marker_in_tanker: Point3::new(
-                    random.random_range(0.0..8.0),
-                    random.random_range(-7.0..7.0),
-                    random.random_range(0.0..3.2),
-                ),
-            })
-            .collect()
-    };
-    let scene = Scene::with_markers(camera, markers, pose);
-    let seen = scene.noisy_observations(SIGMA_PX, &mut random);
-    (scene.camera().clone(), seen)
-}
+use solver_support::{frame, full_budget, plumb_bob_camera, survey};
 
 fn rays(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("ray_from_pixel");
@@ -93,13 +58,13 @@ fn estimates(criterion: &mut Criterion) {
             ..Default::default()
         });
         for count in [6, 100, 1000] {
-            let (camera, seen) = frame(paper_camera(), count);
+            let (camera, seen) = (paper_camera(), frame(&paper_camera(), count));
             group.bench_function(BenchmarkId::new(name, count), |bencher| {
                 bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
             });
         }
     }
-    let (camera, seen) = frame(plumb_bob_camera(), 6);
+    let (camera, seen) = (plumb_bob_camera(), frame(&plumb_bob_camera(), 6));
     let estimator = Estimator::new(EstimatorSettings::default());
     group.bench_function(BenchmarkId::new("prior_plumb_bob", 6), |bencher| {
         bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
@@ -108,42 +73,15 @@ fn estimates(criterion: &mut Criterion) {
 
 /// The same frames with every cause of an error budget.
 fn with_budget(criterion: &mut Criterion) {
-    let mode = |name: &str, places: &[usize], sigma: f64| {
-        let mut change = CalibrationChange::zeros();
-        for &place in places {
-            change[place] = sigma;
-        }
-        CalibrationMode {
-            name: name.to_owned(),
-            change,
-        }
-    };
     let mut group = criterion.benchmark_group("estimate_budget");
     for count in [6, 100] {
-        let (camera, seen) = frame(paper_camera(), count);
-        let survey: Vec<(u32, f64)> = seen.iter().map(|seen| (seen.id, 0.02)).collect();
-        let bend = |seen: &Observation| {
-            let up = 0.3 * (seen.marker_in_tanker.y / 7.13).powi(2);
-            (seen.id, Vector3::new(0.0, 0.0, up))
-        };
-        let flex = vec![FlexMode {
-            name: "wing_bending".to_owned(),
-            time_constant_s: None,
-            shape: seen.iter().map(bend).collect(),
-        }];
-        let calibration = vec![
-            mode("focal_length", &[0, 1], 0.003),
-            mode("principal_point_u", &[2], 3.0),
-            mode("principal_point_v", &[3], 3.0),
-            mode("k1", &[4], 0.02),
-        ];
+        let (camera, seen) = (paper_camera(), frame(&paper_camera(), count));
         let exact = Estimator::new(EstimatorSettings::default());
-        let only_survey = ErrorBudget::new(&survey, vec![], vec![], 0.0).expect("a budget");
-        let full = ErrorBudget::new(&survey, flex, calibration, 0.5).expect("a budget");
+        let only_survey = ErrorBudget::new(&survey(&seen), vec![], vec![], 0.0).expect("a budget");
         for (name, estimator) in [
             ("none", exact.clone()),
             ("survey", exact.clone().with_budget(only_survey)),
-            ("full", exact.with_budget(full)),
+            ("full", exact.with_budget(full_budget(&seen))),
         ] {
             group.bench_function(BenchmarkId::new(name, count), |bencher| {
                 bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
@@ -162,7 +100,7 @@ fn exclusion(criterion: &mut Criterion) {
             ..Default::default()
         });
         for count in [6, 12] {
-            let (camera, mut seen) = frame(paper_camera(), count);
+            let (camera, mut seen) = (paper_camera(), frame(&paper_camera(), count));
             seen[2].pixel.u += 40.0;
             let solution = estimator.estimate(&camera, &seen, None);
             assert!(solution.is_ok_and(|s| s.excluded.contains(seen[2].id)));
@@ -178,7 +116,7 @@ fn orthogonal_iteration(criterion: &mut Criterion) {
     const TOLERANCE_RAD: f64 = 1e-6;
     const MAX_ITERATIONS: u32 = 1000;
     let mut group = criterion.benchmark_group("orthogonal_iteration");
-    let (camera, seen) = frame(paper_camera(), 6);
+    let (camera, seen) = (paper_camera(), frame(&paper_camera(), 6));
     let rays: Vec<Ray> = seen
         .iter()
         .map(|o| camera.ray_from_pixel(o.pixel).expect("a pinhole"))
@@ -214,7 +152,7 @@ fn orthogonal_iteration(criterion: &mut Criterion) {
 
 fn filter(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("filter");
-    let (camera, seen) = frame(paper_camera(), 6);
+    let (camera, seen) = (paper_camera(), frame(&paper_camera(), 6));
     let solution = Estimator::new(EstimatorSettings::default())
         .estimate(&camera, &seen, None)
         .expect("a noisy frame is solvable");
