@@ -1,23 +1,31 @@
 """What every test is handed: a ROS domain of its own, an rclpy peer, and ways to start the node."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+# Before numpy is imported: on two cores, threads that spin for work hold up the nodes under test.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 # Before rclpy is imported, for it is read once: nothing leaves this host or comes in from outside.
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 _FOREIGN = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "RUST_LOG")
 for _variable in _FOREIGN:
     os.environ.pop(_variable, None)
 
+# A shell's background job ignores SIGINT, and what it starts inherits that; what is started here is to get it as from a
+# terminal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 # A request to a service that was discovered a moment ago would else be repeated after 3 s.
 os.environ["FASTDDS_DEFAULT_PROFILES_FILE"] = str(
     Path(__file__).parent / "fixtures" / "fastdds_fast_heartbeat.xml"
 )
 os.environ["RMW_FASTRTPS_USE_QOS_FROM_XML"] = "1"
+
+import numpy as np  # noqa: E402
 
 from harness.domains import claimed_domain  # noqa: E402
 from harness.estimator import FEATURE_POINTS, Estimator, Topics  # noqa: E402
