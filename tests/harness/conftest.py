@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 from harness.domains import claimed_domain  # noqa: E402
 from harness.estimator import FEATURE_POINTS, Estimator, Topics  # noqa: E402
 from harness.peer import BEST_EFFORT, Peer  # noqa: E402
-from harness.processes import Process, binary  # noqa: E402
+from harness.processes import Process, binary, started  # noqa: E402
 
 StartNode = Callable[..., Process]
 StartEstimator = Callable[..., Estimator]
@@ -54,25 +54,17 @@ def peer(domain: int) -> Iterator[Peer]:
 @pytest.fixture
 def start_node(domain: int, tmp_path: Path) -> Iterator[StartNode]:
     """Starts the node with ROS arguments; in the end all that still run must leave with code 0."""
-    started: list[Process] = []
+    with started() as nodes:
 
-    def start(*ros_arguments: str, environment: dict[str, str] | None = None) -> Process:
-        command = [str(binary("tanker_pose_node"))]
-        if ros_arguments:
-            command += ["--ros-args", *ros_arguments]
-        process = Process(command, domain, tmp_path / f"node_{len(started)}", environment or {})
-        started.append(process)
-        return process
+        def start(*ros_arguments: str, environment: dict[str, str] | None = None) -> Process:
+            command = [str(binary("tanker_pose_node"))]
+            if ros_arguments:
+                command += ["--ros-args", *ros_arguments]
+            directory = tmp_path / f"node_{len(nodes)}"
+            nodes.append(Process(command, domain, directory, environment or {}))
+            return nodes[-1]
 
-    yield start
-    try:
-        for process in started:
-            if process.running:
-                process.stop()
-    finally:
-        for process in started:
-            process.kill_if_running()
-            print(f"--- {process.name} ---\n{process.log}")
+        yield start
 
 
 @pytest.fixture

@@ -1,10 +1,14 @@
 """Starting and ending the programs under test: only what was started here is ever ended here."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from harness.waiting import PATIENCE_S, wait_until
 
@@ -116,3 +120,33 @@ class Process:
         if self.running:
             self._child.kill()
             self._child.wait()
+
+
+@contextmanager
+def started(*, leave_well: bool = True) -> Iterator[list[Process]]:
+    """A list for what a test starts: in the end all of it that still runs must leave with code 0, or is killed."""
+    processes: list[Process] = []
+    yield processes
+    try:
+        for process in processes:
+            if leave_well and process.running:
+                process.stop()
+    finally:
+        for process in processes:
+            process.kill_if_running()
+            print(f"--- {process.name} ---\n{process.log}")
+
+
+def answers(command: list[str | Path], lines: Iterable[str]) -> list[Any]:
+    """What a program that answers each line with one of JSON prints."""
+    result = subprocess.run(
+        command,
+        input="".join(f"{line}\n" for line in lines),
+        env=child_environment(),
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return [json.loads(line) for line in result.stdout.splitlines()]

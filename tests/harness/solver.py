@@ -1,14 +1,12 @@
 """`tanker_pose solve` as a function: frames in, answers out, through the real program's pipes."""
 
-import json
-import subprocess
 from typing import Any
 
 import numpy as np
 
 from harness import paper
 from harness.camera_model import Camera
-from harness.processes import binary, child_environment
+from harness.processes import answers, binary
 from harness.rotations import Array, Pose
 
 
@@ -37,17 +35,7 @@ def request(
 
 def solve(*lines: str, arguments: tuple[str, ...] = ()) -> list[dict[str, Any]]:
     """The answers to the given input lines."""
-    result = subprocess.run(
-        [binary("tanker_pose"), "solve", *arguments],
-        input="".join(f"{line}\n" for line in lines),
-        env=child_environment(),
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return [json.loads(line) for line in result.stdout.splitlines()]
+    return answers([binary("tanker_pose"), "solve", *arguments], lines)
 
 
 def pose_in(answer: dict[str, Any]) -> Pose:

@@ -6,14 +6,13 @@ root) or a fold (the derivative is no longer positive definite) lies in the way.
 """
 
 import json
-import subprocess
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import pytest
 
-from harness.processes import binary, child_environment
+from harness.processes import answers, example
 from harness.rotations import Array
 
 WIDTH, HEIGHT, FOCAL = 1280, 960, 900.0
@@ -163,17 +162,7 @@ def rays(calibration: Calibration) -> tuple[Array, Array]:
         "k": calibration.k.ravel().tolist(),
         "pixels": PIXELS.tolist(),
     }
-    result = subprocess.run(
-        [binary("examples/pixel_rays")],
-        input=json.dumps(request) + "\n",
-        env=child_environment(),
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    (answer,) = answers([example("pixel_rays")], [json.dumps(request)])
     accepted = np.array([ray is not None for ray in answer["rays"]])
     back = np.array([pixel or [np.nan, np.nan] for pixel in answer["pixels"]])
     return accepted, np.linalg.norm(back - PIXELS, axis=1)

@@ -16,7 +16,14 @@ from harness.conftest import StartEstimator, StartNode
 from harness.peer import RELIABLE, Peer
 from harness.bags import read_bag
 from harness.messages import key
-from harness.processes import REPOSITORY, Process, binary, child_environment, example
+from harness.processes import (
+    REPOSITORY,
+    Process,
+    binary,
+    child_environment,
+    example,
+    started,
+)
 from harness.waiting import wait_until
 
 LANGUAGES = ["python", "rust"]
@@ -32,16 +39,13 @@ def command(name: str, language: str) -> list[str]:
 @pytest.fixture
 def run_example(domain: int, tmp_path: Path) -> Iterator:
     """Starts examples; none outlives the test."""
-    started: list[Process] = []
+    with started(leave_well=False) as programs:
 
-    def run(name: str, language: str) -> Process:
-        started.append(Process(command(name, language), domain, tmp_path / name, {}))
-        return started[-1]
+        def run(name: str, language: str) -> Process:
+            programs.append(Process(command(name, language), domain, tmp_path / name, {}))
+            return programs[-1]
 
-    yield run
-    for process in started:
-        process.kill_if_running()
-        print(f"--- {process.name} ---\n{process.log}")
+        yield run
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -108,22 +112,17 @@ def test_ctrl_c_ends_a_program_in_python_well_whatever_it_is_doing(
     # a traceback.
     environment = {"PYTHONPROFILEIMPORTTIME": "1"}
     moments_s = [0.0, 0.02, 0.05, 0.1, 0.2, 0.4]
-    started = [
-        Process(command(name, "python"), domain, tmp_path / f"{name}_{number}", environment)
-        for number in range(len(moments_s))
-    ]
-    try:
-        for process, moment_s in zip(started, moments_s, strict=True):
+    with started(leave_well=False) as programs:
+        for moment_s in moments_s:
+            directory = tmp_path / f"{name}_{moment_s}"
+            programs.append(Process(command(name, "python"), domain, directory, environment))
+        for program, moment_s in zip(programs, moments_s, strict=True):
             wait_until(
-                lambda: re.search(r"(?m)\| +tanker_pose\.msg$", process.log), "the imports"
+                lambda: re.search(r"(?m)\| +tanker_pose\.msg$", program.log), "the imports"
             )
             time.sleep(moment_s)
-            process.stop()
-            assert "Traceback" not in process.log
-    finally:
-        for process in started:
-            process.kill_if_running()
-            print(f"--- {process.name} ---\n{process.log[-2000:]}")
+            program.stop()
+            assert "Traceback" not in program.log
 
 
 def documented(program: str) -> str:

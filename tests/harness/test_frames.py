@@ -5,7 +5,6 @@ and converted by plain rigid geometry.
 """
 
 import json
-import subprocess
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from harness.processes import child_environment, example
+from harness.processes import answers, example
 from harness.rotations import Array
 
 SAMPLES = 20_000
@@ -63,17 +62,7 @@ CHAINS = [
 
 
 def convert(*requests: dict[str, Any]) -> list[dict[str, Any]]:
-    result = subprocess.run(
-        [example("convert_frames")],
-        input="".join(f"{json.dumps(request)}\n" for request in requests),
-        env=child_environment(),
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return [json.loads(line) for line in result.stdout.splitlines()]
+    return answers([example("convert_frames")], map(json.dumps, requests))
 
 
 def request(pose: Rigid, covariance: Array, chain: list[str]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from rcl_interfaces.msg import ParameterType
 from std_msgs.msg import Header
 
 from harness.peer import RELIABLE, Peer
-from harness.processes import Process, example
+from harness.processes import Process, example, started
 from harness.test_managed_node import ACTIVATE, CONFIGURE, DEACTIVATE, Manager
 from harness.test_parameter_services import Client
 from harness.waiting import wait_until
@@ -21,16 +21,15 @@ StartTalker = Callable[..., Process]
 @pytest.fixture
 def start_talker(domain: int, tmp_path: Path) -> Iterator[StartTalker]:
     """Starts the example in a namespace, its topic remapped; none outlives the test."""
-    started: list[Process] = []
+    with started(leave_well=False) as talkers:
 
-    def start(*ros_arguments: str) -> Process:
-        command = [str(example("talker")), "--ros-args", "-r", "__ns:=/left", "-r", "header:=time"]
-        started.append(Process([*command, *ros_arguments], domain, tmp_path / "talker", {}))
-        return started[-1]
+        def start(*ros_arguments: str) -> Process:
+            command = [str(example("talker")), "--ros-args"]
+            command += ["-r", "__ns:=/left", "-r", "header:=time", *ros_arguments]
+            talkers.append(Process(command, domain, tmp_path / "talker", {}))
+            return talkers[-1]
 
-    yield start
-    for process in started:
-        process.kill_if_running()
+        yield start
 
 
 def is_known(peer: Peer) -> bool:

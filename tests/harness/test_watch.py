@@ -18,7 +18,7 @@ from harness import messages
 from harness.conftest import StartEstimator, StartNode
 from harness.estimator import Answer, Estimator, Topics
 from harness.peer import Peer
-from harness.processes import Process, binary, child_environment
+from harness.processes import Process, binary, child_environment, started
 from harness.waiting import PATIENCE_S, wait_until
 
 NAMESPACE = "/receiver"
@@ -38,22 +38,14 @@ POSITION = re.compile(
 @pytest.fixture
 def start_watch(domain: int, tmp_path: Path) -> Iterator[StartWatch]:
     """Starts the tool; in the end all that still run must leave with code 0."""
-    started: list[Process] = []
+    with started() as tools:
 
-    def start(*arguments: str) -> Process:
-        command = [str(binary("tanker_pose")), "watch", *arguments]
-        started.append(Process(command, domain, tmp_path / f"watch_{len(started)}", {}))
-        return started[-1]
+        def start(*arguments: str) -> Process:
+            command = [str(binary("tanker_pose")), "watch", *arguments]
+            tools.append(Process(command, domain, tmp_path / f"watch_{len(tools)}", {}))
+            return tools[-1]
 
-    yield start
-    try:
-        for process in started:
-            if process.running:
-                process.stop()
-    finally:
-        for process in started:
-            process.kill_if_running()
-            print(f"--- watch ---\n{process.log}")
+        yield start
 
 
 def lines(watch: Process) -> list[str]:
