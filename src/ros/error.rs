@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::consumers::ConsumersError;
 use super::names::NamesError;
-use super::participant::{EndpointError, OpenError};
+use super::participant::{EndpointError, MiddlewareGone, OpenError};
 use super::start_values::StartParameterError;
 use crate::camera::CalibrationBudgetError;
 use crate::config::TogetherError;
@@ -64,10 +64,7 @@ pub enum NodeError {
     /// A topic cannot be opened.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
-    /// Nothing can be heard or said any more.
-    #[error(
-        "the middleware has stopped: its threads do not survive suspending and resuming the process \
-         (SIGSTOP, Ctrl-Z, a debugger); restart the node"
-    )]
-    MiddlewareGone,
+    /// The middleware has stopped.
+    #[error(transparent)]
+    MiddlewareGone(#[from] MiddlewareGone),
 }

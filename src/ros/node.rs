@@ -1,4 +1,8 @@
 //! The node: parameters and marker map in, topics open, messages to the estimator until it has to stop.
+//!
+//! It puts the parts of `ros2_node` together itself, rather than by `ros2_node::node::Node`: parameters decide which
+//! topics there are, files are read before the graph is joined, it may run in a thread whose signals are the caller's,
+//! and one loop keeps events and samples in order.
 
 use async_signal::{Signal, Signals};
 use futures::StreamExt;

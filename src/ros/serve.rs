@@ -132,7 +132,7 @@ impl<'a> Server<'a> {
             }
             select_biased! {
                 () = stop => return Ok(()),
-                _ = seconds.select_next_some() => self.check_middleware()?,
+                _ = seconds.select_next_some() => self.ros.check_alive()?,
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Handler::on_reset),
                 request = requests.select_next_some() => self.on_request(&request),
@@ -177,7 +177,7 @@ impl<'a> Server<'a> {
                     Err(error) => handler.on_undecodable(ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
-                    self.check_middleware()?;
+                    self.ros.check_alive()?;
                     let publishers = self.ros.publisher_count(topic).unwrap_or(0);
                     let graph = self.ros.graph();
                     for (topic, lost) in &lost {
@@ -200,15 +200,6 @@ impl<'a> Server<'a> {
             lifecycle.close();
         }
         self.sim_time.close();
-    }
-
-    /// Returns an error when nothing can be heard or said any more: silence would have no reason.
-    fn check_middleware(&self) -> Result<(), NodeError> {
-        if self.ros.is_alive() {
-            Ok(())
-        } else {
-            Err(NodeError::MiddlewareGone)
-        }
     }
 
     fn with(&mut self, act: impl FnOnce(&mut Handler)) {

@@ -41,6 +41,7 @@ use crate::names::{NamesError, NodeNames};
 use crate::parameters::{
     ParameterServices, ParameterSpec, Parameters, SharedParameters, USE_SIM_TIME,
 };
+pub use crate::participant::MiddlewareGone;
 use crate::participant::{EndpointError, OpenError, RosNode};
 use crate::qos_overrides::{Endpoint, QosOverrides, Role};
 use crate::start_values::{StartParameterError, start_values};
@@ -83,14 +84,6 @@ pub enum NodeError {
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
 }
-
-/// Nothing can be heard or said any more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the middleware has stopped: its threads do not survive suspending and resuming the process \
-     (SIGSTOP, Ctrl-Z, a debugger); restart the node"
-)]
-pub struct MiddlewareGone;
 
 type Check = Box<dyn Fn(&Parameters) -> Result<(), String> + Send + Sync>;
 
@@ -266,7 +259,7 @@ impl Node {
     /// Waits for the next event. Nothing is lost when this future is dropped before it is ready.
     ///
     /// # Errors
-    /// [`MiddlewareGone`] when there is nothing left to work with.
+    /// [`MiddlewareGone`]: the node can only be closed.
     pub async fn next(&mut self) -> Result<Event, MiddlewareGone> {
         loop {
             // A channel that others have closed is pending, and not ready without end.
@@ -280,9 +273,7 @@ impl Node {
                     return Ok(Event::Parameters(parameters));
                 }
                 request = received(&self.requests).fuse() => return Ok(Event::Transition(request)),
-                _ = self.looks.next().fuse() => if !self.ros.is_alive() {
-                    return Err(MiddlewareGone);
-                },
+                _ = self.looks.next().fuse() => self.ros.check_alive()?,
             }
         }
     }

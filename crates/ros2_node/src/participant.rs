@@ -123,6 +123,14 @@ pub enum EndpointError {
     },
 }
 
+/// The middleware's threads have ended: the node neither receives nor sends any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the middleware has stopped: its threads do not survive suspending and resuming the process \
+     (SIGSTOP, Ctrl-Z, a debugger); restart it"
+)]
+pub struct MiddlewareGone;
+
 /// A node in the graph, with its background task running.
 ///
 /// The fields stand in the order in which they have to be dropped.
@@ -269,15 +277,15 @@ impl RosNode {
         Domain::of::<M>(&self.context.domain_participant())
     }
 
-    /// Returns whether the middleware's threads still run. They end, for good, when the process is stopped and
-    /// continued: the system then interrupts their waits, which `RustDDS` takes for a failure.
-    #[must_use]
-    pub fn is_alive(&self) -> bool {
-        // Asked of the thread that would have to answer; nothing in this node has such a liveliness.
-        self.context
-            .domain_participant()
-            .assert_liveliness()
-            .is_ok()
+    /// Checks that the middleware's threads still run. They end, for good, when the process is stopped and continued:
+    /// the system then interrupts their waits, which `RustDDS` takes for a failure.
+    ///
+    /// # Errors
+    /// [`MiddlewareGone`] when they have ended.
+    pub fn check_alive(&self) -> Result<(), MiddlewareGone> {
+        // Any request to the thread would do; no endpoint of this node has a liveliness that this could assert.
+        let participant = self.context.domain_participant();
+        participant.assert_liveliness().map_err(|_| MiddlewareGone)
     }
 
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.
@@ -304,14 +312,6 @@ impl RosNode {
     /// [`NamesError`] when the name is malformed.
     pub fn publisher_count(&self, topic: &str) -> Result<usize, NamesError> {
         Ok(self.node.publisher_count(&self.names.topic(topic)?))
-    }
-
-    /// Returns how many subscriptions the graph has on `topic`, its name expanded and remapped.
-    ///
-    /// # Errors
-    /// [`NamesError`] when the name is malformed.
-    pub fn subscription_count(&self, topic: &str) -> Result<usize, NamesError> {
-        Ok(self.node.subscription_count(&self.names.topic(topic)?))
     }
 
     /// Leaves the graph and tells the others. Publishers and subscriptions must be dropped before.

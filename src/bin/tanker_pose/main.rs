@@ -14,6 +14,8 @@ mod solve;
 #[cfg(feature = "ros")]
 mod terminal;
 #[cfg(feature = "ros")]
+mod tool_node;
+#[cfg(feature = "ros")]
 mod watch;
 
 use std::process::ExitCode;

@@ -8,18 +8,17 @@ pub mod source;
 
 use std::time::{Duration, Instant};
 
-use async_signal::{Signal, Signals};
+use async_signal::Signals;
 use futures::StreamExt;
 use futures::future::{Either, select};
-use tanker_pose::ros::arguments::ArgumentError;
-use tanker_pose::ros::environment::{Environment, EnvironmentError};
-use tanker_pose::ros::names::{NamesError, NodeNames};
-use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode, within};
+use tanker_pose::ros::environment::Environment;
+use tanker_pose::ros::names::NamesError;
+use tanker_pose::ros::participant::{EndpointError, NodeOptions, RosNode, within};
 use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
-use tanker_pose::ros::{LOG_TARGET, logging};
 use tanker_pose::simulation::Approach;
 
-use crate::ros_options::{NoParametersError, RosOptions, between, check_no_parameters};
+use crate::ros_options::{RosOptions, between};
+use crate::tool_node::{JoinError, ToolNode};
 pub use approach_options::{ApproachError, ApproachOptions};
 use fault::gross_error;
 pub use pace::Pace;
@@ -69,17 +68,9 @@ pub enum SimulateError {
     #[error(transparent)]
     Approach(#[from] ApproachError),
     #[error(transparent)]
-    Argument(#[from] ArgumentError),
-    #[error(transparent)]
-    Parameter(#[from] NoParametersError),
-    #[error(transparent)]
-    Environment(#[from] EnvironmentError),
+    Join(#[from] JoinError),
     #[error(transparent)]
     Names(#[from] NamesError),
-    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
-    Signals(std::io::Error),
-    #[error(transparent)]
-    Open(#[from] OpenError),
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
     #[error(transparent)]
@@ -88,34 +79,23 @@ pub enum SimulateError {
 
 /// Publishes the approach until it ends, or until SIGINT or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
-    let ros_arguments = arguments.ros.read()?;
-    let environment = Environment::from_process()?;
-    let names = NodeNames::new(NODE_NAME, &ros_arguments.remaps)?;
-    let warnings = check_no_parameters(&ros_arguments, &names)?;
     let (approach, camera_info) = arguments.approach.read()?;
-    // From here on a signal is kept until it is read, and ends the node in good order.
-    let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(SimulateError::Signals)?;
-    let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, NodeOptions::new())?;
-    logging::start(&ros_arguments, ros.names(), LOG_TARGET);
-    for warning in environment.warnings.iter().chain(&warnings) {
-        log::warn!("{warning}");
-    }
+    let mut node = ToolNode::join(NODE_NAME, &arguments.ros, None, NodeOptions::new())?;
     let length = (!arguments.repeat).then(|| approach.frame_count());
     let report = Report::new(arguments.json, length, arguments.approach.rate_hz);
-    let result = introduce(&report, arguments, &ros, &environment)
+    let result = introduce(&report, arguments, &node.ros, &node.environment)
         .map_err(SimulateError::from)
         .and_then(|()| {
-            let source = Source::open(&mut ros, &camera_info, &arguments.frame_id)?;
+            let source = Source::open(&mut node.ros, &camera_info, &arguments.frame_id)?;
             let mut simulation = Simulation {
                 arguments,
                 approach,
                 source,
                 report,
             };
-            smol::block_on(simulation.run(&ros, &mut signals))
+            smol::block_on(simulation.run(&node.ros, &mut node.signals))
         });
-    logging::stop_rosout();
-    ros.close();
+    node.leave();
     result
 }
 

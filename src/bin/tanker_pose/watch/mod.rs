@@ -11,18 +11,17 @@ mod words;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use async_signal::{Signal, Signals};
+use async_signal::Signals;
 use futures::StreamExt;
 use futures::future::{Either, select};
-use tanker_pose::ros::arguments::ArgumentError;
-use tanker_pose::ros::environment::{Environment, EnvironmentError};
+use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::EstimatorStatus;
-use tanker_pose::ros::names::{NamesError, NodeNames};
-use tanker_pose::ros::participant::{EndpointError, NodeOptions, OpenError, RosNode};
+use tanker_pose::ros::names::NamesError;
+use tanker_pose::ros::participant::{EndpointError, MiddlewareGone, NodeOptions, RosNode};
 use tanker_pose::ros::topics::STATUS;
-use tanker_pose::ros::{LOG_TARGET, logging};
 
-use crate::ros_options::{NoParametersError, RosOptions, between, check_no_parameters};
+use crate::ros_options::{RosOptions, between};
+use crate::tool_node::{JoinError, ToolNode};
 use ears::Ears;
 use heard::Heard;
 use screen::Screen;
@@ -69,49 +68,27 @@ pub struct Arguments {
 #[derive(Debug, thiserror::Error)]
 pub enum WatchError {
     #[error(transparent)]
-    Argument(#[from] ArgumentError),
-    #[error(transparent)]
-    Parameter(#[from] NoParametersError),
-    #[error(transparent)]
-    Environment(#[from] EnvironmentError),
+    Join(#[from] JoinError),
     #[error(transparent)]
     Names(#[from] NamesError),
-    #[error("cannot listen for SIGINT and SIGTERM: {0}")]
-    Signals(io::Error),
-    #[error(transparent)]
-    Open(#[from] OpenError),
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
     #[error(transparent)]
     Several(#[from] SeveralNodes),
     #[error("no pose within {seconds} s: {reason}")]
     NoPose { seconds: f64, reason: String },
-    #[error(
-        "the middleware's threads have ended, as they do when a process is suspended: start again"
-    )]
-    MiddlewareGone,
+    #[error(transparent)]
+    MiddlewareGone(#[from] MiddlewareGone),
 }
 
 /// Watches until it is to end.
 pub fn run(arguments: &Arguments) -> Result<(), WatchError> {
-    let ros_arguments = arguments.ros.read()?;
-    let mut environment = Environment::from_process()?;
-    environment.domain_id = arguments.domain_id.unwrap_or(environment.domain_id);
-    let names = NodeNames::new(NODE_NAME, &ros_arguments.remaps)?;
-    let warnings = check_no_parameters(&ros_arguments, &names)?;
-    // From here on a signal is kept until it is read, and ends the tool in good order.
-    let mut signals = Signals::new([Signal::Int, Signal::Term]).map_err(WatchError::Signals)?;
     let options = NodeOptions::new().start_parameter_services(false);
-    let mut ros = RosNode::open(NODE_NAME, &ros_arguments, &environment, options)?;
-    logging::start(&ros_arguments, ros.names(), LOG_TARGET);
-    for warning in environment.warnings.iter().chain(&warnings) {
-        log::warn!("{warning}");
-    }
-    let result = Watch::new(arguments, &ros, &environment)
+    let mut node = ToolNode::join(NODE_NAME, &arguments.ros, arguments.domain_id, options)?;
+    let result = Watch::new(arguments, &node.ros, &node.environment)
         .map_err(WatchError::from)
-        .and_then(|mut watch| smol::block_on(watch.run(&mut ros, &mut signals)));
-    logging::stop_rosout();
-    ros.close();
+        .and_then(|mut watch| smol::block_on(watch.run(&mut node.ros, &mut node.signals)));
+    node.leave();
     result
 }
 
@@ -196,9 +173,7 @@ impl Watch {
     }
 
     fn look(&mut self, ros: &mut RosNode, now: Instant) -> Result<(), WatchError> {
-        if !ros.is_alive() {
-            return Err(WatchError::MiddlewareGone);
-        }
+        ros.check_alive()?;
         self.search.look(&ros.domain::<EstimatorStatus>(), now)?;
         if let Some(found) = self.search.found() {
             self.ears.attend(ros, &found.node)?;
