@@ -43,16 +43,7 @@ pub struct FeaturePointArray {
     pub points: Vec<FeaturePoint>,
 }
 
-macro_rules! ros_message {
-    ($($package:literal / $name:ident),+ $(,)?) => {$(
-        impl Message for $name {
-            const PACKAGE: &'static str = $package;
-            const NAME: &'static str = stringify!($name);
-        }
-    )+};
-}
-
-ros_message!(
+ros2_node::ros_message!(
     "geometry_msgs" / PoseStamped,
     "geometry_msgs" / PoseWithCovarianceStamped,
     "nav_msgs" / Odometry,

@@ -6,7 +6,7 @@
 //! A message of your own is a struct with the fields of its `.msg` file, in their order:
 //!
 //! ```
-//! use ros2_node::messages::{Header, Message};
+//! use ros2_node::messages::Header;
 //! use serde::{Deserialize, Serialize};
 //!
 //! /// `sensor_msgs/Temperature`.
@@ -17,10 +17,7 @@
 //!     variance: f64,
 //! }
 //!
-//! impl Message for Temperature {
-//!     const PACKAGE: &'static str = "sensor_msgs";
-//!     const NAME: &'static str = "Temperature";
-//! }
+//! ros2_node::ros_message!("sensor_msgs" / Temperature);
 //! ```
 
 use serde::{Deserialize, Serialize};
@@ -41,16 +38,18 @@ pub trait Message: Serialize + for<'de> Deserialize<'de> + 'static {
     const NAME: &'static str;
 }
 
+/// Implements [`Message`] for structs that are called as their ROS messages: `ros_message!("sensor_msgs" / Imu, …)`.
+#[macro_export]
 macro_rules! ros_message {
     ($($package:literal / $name:ident),+ $(,)?) => {$(
-        impl Message for $name {
+        impl $crate::messages::Message for $name {
             const PACKAGE: &'static str = $package;
             const NAME: &'static str = stringify!($name);
         }
     )+};
 }
 
-ros_message!(
+crate::ros_message!(
     "lifecycle_msgs" / TransitionEvent,
     "rcl_interfaces" / ParameterEvent,
     "rosgraph_msgs" / Clock,

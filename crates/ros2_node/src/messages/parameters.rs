@@ -11,10 +11,8 @@ pub struct Clock {
     pub clock: Time,
 }
 
-/// `rcl_interfaces/ParameterType`: what a [`WireValue`] holds.
+/// `rcl_interfaces/ParameterType`: what a [`WireValue`] holds; 0 is none.
 pub mod parameter_type {
-    /// Nothing.
-    pub const NOT_SET: u8 = 0;
     /// True or false.
     pub const BOOL: u8 = 1;
     /// A whole number.
