@@ -9,8 +9,8 @@ pub struct Stamp {
     pub nanosec: u32,
 }
 
-/// s; a pose older than this says little about the next one.
-const MAX_PREVIOUS_AGE_S: f64 = 2.0;
+/// 2 s, in ns: a pose older than this says little about the next one.
+const MAX_PREVIOUS_AGE_NS: i64 = 2_000_000_000;
 
 impl Stamp {
     /// Returns the whole time in nanoseconds, of which 64 bits hold every stamp there can be.
@@ -32,10 +32,8 @@ impl Stamp {
         })
     }
 
-    /// Returns whether this is at or after `earlier`, by [`MAX_PREVIOUS_AGE_S`] at the most.
+    /// Returns whether this is at or after `earlier`, by [`MAX_PREVIOUS_AGE_NS`] at the most.
     pub(super) fn follows_closely(self, earlier: Self) -> bool {
-        let seconds = f64::from(self.sec) - f64::from(earlier.sec);
-        let nanoseconds = f64::from(self.nanosec) - f64::from(earlier.nanosec);
-        (0.0..=MAX_PREVIOUS_AGE_S).contains(&(seconds + nanoseconds * 1e-9))
+        (0..=MAX_PREVIOUS_AGE_NS).contains(&(self.nanoseconds() - earlier.nanoseconds()))
     }
 }

@@ -9,7 +9,7 @@ use crate::yaml::Place;
 const MIN_MARKERS: usize = 3;
 
 /// Farthest coordinate, m: a hundred times the largest tanker, so beyond it the unit is wrong.
-pub(super) const MAX_COORDINATE_M: f64 = 1.0e3;
+pub const MAX_COORDINATE_M: f64 = 1.0e3;
 
 /// Least distance between two markers, m: below it they are one marker entered twice.
 const MIN_DISTANCE_M: f64 = 1.0e-3;

@@ -17,6 +17,7 @@ mod tag;
 mod tag_file;
 
 pub use budget::{Flex, MAX_FLEX_MODES, MapBudget};
+pub use check::MAX_COORDINATE_M;
 pub use error::MarkerMapError;
 pub use map::MarkerMap;
 pub use marker::Marker;

@@ -17,7 +17,7 @@ use tanker_pose::estimation::Estimator;
 use tanker_pose::pipeline::{
     self, Detection, FrameOutcome, ImageEdges, Refusal, modes_of_file, observe,
 };
-use tanker_pose::target::MarkerMap;
+use tanker_pose::target::{MAX_COORDINATE_M, MarkerMap};
 
 use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
 use crate::options::{self, CalibrationError, EstimatorOptions};
@@ -26,9 +26,6 @@ use crate::options::{self, CalibrationError, EstimatorOptions};
 const MAX_LINE_BYTES: u64 = 1 << 20;
 /// What is passed over in search of the end of a longer one.
 const MAX_SKIPPED_BYTES: u64 = 1 << 28;
-
-/// m; a marker farther from the tanker's origin is a mistake in units.
-const MAX_COORDINATE_M: f64 = 1e3;
 
 #[derive(Debug, clap::Args)]
 #[command(allow_negative_numbers = true)]
