@@ -2,7 +2,7 @@
 //!
 //! Comparisons with other solvers are in `benches/peers`.
 
-#![allow(missing_docs)] // of the functions that criterion's macros make
+#![expect(missing_docs, reason = "criterion's macros make public functions")]
 
 use std::hint::black_box;
 

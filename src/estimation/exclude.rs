@@ -57,7 +57,10 @@ pub(crate) struct Judge<S, P> {
 }
 
 /// What a search came to.
-#[allow(clippy::large_enum_variant)] // a box would take the heap, and there is one of these a frame
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would allocate, and a frame has one of these"
+)]
 pub(crate) enum Found {
     /// The pose without the points that are wrong.
     Solution(Solution),

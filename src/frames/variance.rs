@@ -18,8 +18,10 @@ fn single<const N: usize>(
 ) -> Result<[f32; N], VarianceError> {
     let mut result = [0.0; N];
     for axis in 0..N {
-        // Rounds to the nearest; too small becomes zero and too large infinite, which is refused below.
-        #[allow(clippy::cast_possible_truncation)]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounds; too small becomes zero and too large infinite, which is refused below"
+        )]
         let value = wanted(given[axis]) as f32;
         if !(value > 0.0 && value.is_finite()) {
             return Err(VarianceError {

@@ -276,7 +276,10 @@ macro_rules! declare_parameters {
 
         /// The value of each parameter.
         #[derive(Debug, Clone, PartialEq)]
-        #[allow(clippy::struct_excessive_bools)]
+        #[allow(
+            clippy::struct_excessive_bools,
+            reason = "parameters are independent switches, and this table may have few"
+        )]
         pub(crate) struct Values {
             $($( $(#[doc = $description])+ pub(crate) $name: $type, )+)+
         }

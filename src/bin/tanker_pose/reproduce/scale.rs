@@ -124,8 +124,10 @@ impl Ranged for Scale {
 
     fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
         let share = (value - self.min) / (self.max - self.min);
-        // Values were clamped to the limits, so the pixel lies between the two it is given.
-        #[allow(clippy::cast_possible_truncation)]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "values are clamped to the limits, so the pixel lies between the two given"
+        )]
         let offset = (share * f64::from(to - from)).round() as i32;
         from + offset
     }

@@ -30,8 +30,11 @@ impl Report {
         } else {
             progress_bar(length.map_or(u64::MAX, u64::from))
         };
-        // At least one frame a line, and a rate is at most 1000 Hz.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between one frame a line and the highest rate, 1000 Hz"
+        )]
         let frames_a_second = rate_hz.round().max(1.0) as u64;
         Self {
             json,
