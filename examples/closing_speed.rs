@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The node needs `-p publish_receptacle:=true -p refuelling:=config/refuelling/example.yaml`: while nothing comes,
-//! what is missing is said on standard error. ROS arguments (`--ros-args -r receptacle:=/uav1/receptacle`) and
+//! what is missing is printed on standard error. ROS arguments (`--ros-args -r receptacle:=/uav1/receptacle`) and
 //! `ROS_DOMAIN_ID` count as for every node.
 
 use std::error::Error;

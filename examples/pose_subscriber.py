@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Logs every trusted pose, and why there is none, until Ctrl-C.
+"""Logs every trusted pose, and the reason when there is none, until Ctrl-C.
 
     python3 examples/pose_subscriber.py --ros-args -r __ns:=/receiver
 

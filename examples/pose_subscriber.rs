@@ -1,4 +1,4 @@
-//! Prints every trusted pose, and why there is none: a subscriber without a ROS installation.
+//! Prints every trusted pose, and the reason when there is none: a subscriber without a ROS installation.
 //!
 //! ```sh
 //! cargo run --example pose_subscriber               # until Ctrl-C

@@ -85,7 +85,7 @@ pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlErro
     })
 }
 
-/// Returns the fault in words for who writes such files; the reader's own words name Rust's types.
+/// Returns the error for the author of the file; the parser's own message names Rust types.
 fn plainly(error: &Error, text: &str, location: Location) -> String {
     let got = || match word_at(text, location) {
         "" => "nothing".to_owned(),

@@ -32,7 +32,7 @@ class Recorder(Node):
         self.create_timer(0.1, self.look)
 
     def look(self) -> None:
-        """Subscribes to the topics that have come to be known."""
+        """Subscribes to topics once they are discovered."""
         known = dict(self.get_topic_names_and_types())
         for topic in sorted(self.waiting & known.keys()):
             publishers = self.get_publishers_info_by_topic(topic)

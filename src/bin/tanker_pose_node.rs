@@ -34,7 +34,7 @@ const INTERNAL_FAULT: i32 = 70;
 
 fn main() -> ExitCode {
     // A middleware thread that ends would leave a node that neither hears nor speaks: end instead, so
-    // that whoever supervises the node sees it.
+    // that a supervisor of the node sees it.
     std::panic::set_hook(Box::new(|fault| {
         let _ = writeln!(
             std::io::stderr(),

@@ -29,7 +29,7 @@ pub enum CameraFileError {
         need_rows: usize,
         need_cols: usize,
     },
-    /// A matrix whose data are not as many as its rows and columns say.
+    /// A matrix whose number of data differs from rows times columns.
     #[error("{place}: data of {matrix} must hold {need} numbers, got {got}")]
     DataLength {
         place: Place,
@@ -47,7 +47,7 @@ pub enum CameraFileError {
     },
 }
 
-/// What was assumed or passed over in a calibration file that was read.
+/// What was assumed or skipped in a calibration file that was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CameraFileWarning {
@@ -163,7 +163,7 @@ impl CameraInfo {
     /// # Inputs
     /// * `text`: the YAML. As in ROS's own reader `camera_name`, binning and region may be left out, a missing
     ///   `distortion_model` is `plumb_bob` (with a warning), the coefficients may stand in a row or a column, and
-    ///   unknown keys are passed over (with a warning). A first line `%YAML:1.0`, as `OpenCV` writes it, is skipped.
+    ///   unknown keys are skipped (with a warning). A first line `%YAML:1.0`, as `OpenCV` writes it, is skipped.
     /// * `source`: what errors call the text, usually its path.
     ///
     /// # Errors
@@ -259,7 +259,7 @@ impl RawMatrix {
         self.numbers(source, matrix, need_rows.saturating_mul(need_cols))
     }
 
-    /// Returns the entries of a matrix whose size is the file's choice: a row, a column, any.
+    /// Returns the entries of a matrix of any size, such as a row or a column.
     fn any_size(&self, source: &str, matrix: &'static str) -> Result<Vec<f64>, CameraFileError> {
         // Saturating: no product of the file's numbers may overflow.
         self.numbers(

@@ -258,7 +258,7 @@ impl Estimator {
             (Initialisation::Previous, Some(seed)) => {
                 match self.solve_from(problem, seed, start) {
                     Ok(solution) if solution.is_trusted() => Ok(solution),
-                    // A tanker that turned meanwhile, or a last pose that was wrong: begin anew.
+                    // A tanker that turned meanwhile, or a last pose that was wrong: restart.
                     _ => nominal(),
                 }
             }
@@ -333,7 +333,7 @@ impl Estimator {
     ) -> Result<Solution, EstimateError> {
         let minimum = problem.descend(seed)?;
         let fit = problem.fit(&minimum.rotation)?;
-        // The last attitude says nothing against a rival: it may have been the wrong one of the two.
+        // The last attitude cannot exclude a rival: it may have been the wrong one of the two.
         let prior = (initialisation == Initialisation::Nominal).then_some(seed);
         let cost = |fit: &Fit| fit.chi_squared + squared_turn(&fit.pose.rotation, prior);
         let rival = ambiguity::rival(problem, &fit);

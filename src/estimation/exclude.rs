@@ -37,7 +37,7 @@ pub(crate) const MIN_REMAINING_WITH_PRIOR: usize = 4;
 pub(crate) const MIN_REMAINING_WITHOUT_PRIOR: usize = 5;
 /// Difference of two costs below which either choice may be the right one: a likelihood ratio of 1000.
 const INDISTINCT: f64 = 13.8;
-/// Points beyond those that must remain from which on two wrong ones can be told from one: with a prior, eight points.
+/// Points beyond those that must remain from which on two wrong ones can be distinguished from one: with a prior, eight points.
 const SPARE_TO_CHECK_PAIRS: usize = 4;
 /// Squared Mahalanobis distance at which two hypotheses disagree: no correct pair of poses with most
 /// of their points in common is so far apart.

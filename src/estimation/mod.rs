@@ -53,7 +53,7 @@ pub enum Initialisation {
     Nominal,
     /// `In_M1`: the linear camera matrix. At least 6 points, not in one plane.
     Dlt,
-    /// The last trusted attitude, or the nominal one where there is none or it leads nowhere. At least 3 points.
+    /// The last trusted attitude, or the nominal one where there is none or it gives no pose. At least 3 points.
     Previous,
     /// No prior: the best of all attitudes. At least 4 points.
     Global,
@@ -255,13 +255,13 @@ pub enum EstimateError {
         cause: UndistortError,
     },
     /// The points cannot fix a pose.
-    #[error("expected points that fix a pose, but {reason}")]
+    #[error("expected points that determine a pose, but {reason}")]
     Degenerate {
         /// What is wrong with them.
         reason: &'static str,
     },
     /// No minimum found.
-    #[error("expected the solver to settle, but it did not within {iterations} iterations")]
+    #[error("expected the solver to converge, but it did not within {iterations} iterations")]
     NoConvergence {
         /// Iterations of the stage that gave up.
         iterations: u16,

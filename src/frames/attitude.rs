@@ -42,7 +42,7 @@ pub enum AttitudeError {
     /// Fewer samples than a rate needs.
     #[error("need 2 samples of the receiver's attitude, got {got}")]
     TooFew {
-        /// Samples since the start, or since they began anew.
+        /// Samples since the start, or since they restarted.
         got: usize,
     },
     /// The newest sample is too old for the image.
@@ -108,7 +108,7 @@ impl AttitudeHistory {
     }
 
     /// Takes a sample. One that is not later than the last is left out; one that is more than a second
-    /// earlier begins anew, since the source of the stamps has.
+    /// earlier restarts, since the source of the stamps has.
     pub fn push(&mut self, sample: AttitudeSample) {
         if let Some(last) = self.samples.back() {
             if seconds(last.stamp_ns, sample.stamp_ns) > 1.0 {

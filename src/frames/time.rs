@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum TimeError {
     /// Before PX4's clock began, or its very beginning, which PX4 takes for "not set".
-    #[error("expected a stamp after PX4's clock began, got one at {px4_us} us of it")]
+    #[error("expected a stamp after the start of PX4's clock, got {px4_us} us on it")]
     BeforePx4Clock {
         /// PX4's time that it would have, µs.
         px4_us: i128,

@@ -2,7 +2,7 @@
 //!
 //! Knows `nalgebra` only. A transform is `b_from_a`: it takes coordinates in `a` to coordinates in
 //! `b`, and neighbours cancel, `c_from_b * b_from_a`. What a pose error is, and in which order its
-//! covariance stands, is told once, in [`PoseCovariance`].
+//! covariance belongs, is defined once, in [`PoseCovariance`].
 
 mod covariance;
 mod motion;

@@ -48,7 +48,7 @@ impl Motion {
     }
 
     /// Returns velocity and rate (of `a` as seen from `b`) in the axes of `a`: what
-    /// `nav_msgs/Odometry` wants, whose twist is in `child_frame_id`.
+    /// `nav_msgs/Odometry` requires, whose twist is in `child_frame_id`.
     ///
     /// Turning into axes that are themselves uncertain adds the attitude's error to the covariance.
     #[must_use]

@@ -1,4 +1,4 @@
-//! Checks of what came, before anything is computed from it.
+//! Checks of the input, before anything is computed from it.
 
 use nalgebra::Point3;
 
@@ -19,7 +19,7 @@ pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Before all else that is said of a frame: even a refusal echoes its header.
+/// Checked first: even a refusal echoes the header.
 pub(super) fn check_frame_id_length(got: &str) -> Result<(), Refusal> {
     if got.len() <= MAX_NAME_BYTES {
         return Ok(());

@@ -256,7 +256,7 @@ mod tests {
             assert!(seen.u > 50.0, "far from the rectified image's own edge");
             let found = is_left_out(&info, true, MARGIN_PX, (seen.u, seen.v));
             assert_eq!(found, expected, "{raw_u}");
-            // Where R is not told, nobody knows where the raw image ends.
+            // Without R the edge of the raw image is unknown.
             let unknown = CameraInfo {
                 r: [0.0; 9],
                 ..info.clone()

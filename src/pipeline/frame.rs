@@ -1,4 +1,4 @@
-//! What came of one image.
+//! The detections of one image.
 
 use super::{Refusal, Stamp};
 

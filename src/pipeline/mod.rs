@@ -196,7 +196,7 @@ impl Pipeline {
             .as_ref()
             .is_some_and(|latched| latched.frame_id != frame_id)
         {
-            // What was seen from there says nothing about here.
+            // Observations of another camera do not apply to this one.
             self.reset();
         }
         let latched = LatchedCamera::new(
@@ -292,7 +292,7 @@ impl Pipeline {
         Ok(outcome.without(left_out))
     }
 
-    /// Takes note of how the residuals of a fit differ from earlier ones.
+    /// Records how the residuals of a fit differ from earlier ones.
     fn watch_scatter(&mut self, stamp: Stamp, outcome: &FrameOutcome) {
         let camera = self.camera.as_ref().map(|latched| &latched.camera);
         if let (Some(solution), Some(Ok(camera))) = (outcome.solution(), camera) {
@@ -337,7 +337,7 @@ impl Pipeline {
         Ok(camera)
     }
 
-    /// Returns where the markers are expected in the image of a stamp; empty where nobody knows.
+    /// Returns where the markers are expected in the image of a stamp; empty where that is unknown.
     ///
     /// Markers are missing whose sigma exceeds an eighth of the image's shorter side, and such as are out of the
     /// image by more than four sigmas. None are expected before the last motion's own stamp.

@@ -1,4 +1,4 @@
-//! For which image a prediction is wanted: the one whose camera info has come, or else the next one by the period.
+//! For which image a prediction is needed: the one whose camera info has arrived, or else the next one by the period.
 
 use super::Stamp;
 use super::checks::check_stamp;
@@ -15,7 +15,7 @@ pub struct NextImage {
 
 impl NextImage {
     /// Takes the stamp of a camera info; returns it as that of the image that it came with. None where it is no
-    /// time, or that of the last one, as from a driver that tells its calibration again and again.
+    /// time, or that of the last one, as from a driver that tells its calibration repeatedly.
     pub fn on_camera_info(&mut self, stamp: Stamp) -> Option<Stamp> {
         check_stamp(stamp).ok()?;
         let is_new = self.info.replace(stamp) != Some(stamp);
@@ -52,7 +52,7 @@ mod tests {
         assert_eq!(next.on_camera_info(at(5, 1)), Some(at(5, 1)));
         assert_eq!(next.on_camera_info(at(5, 1)), None);
         assert_eq!(next.on_camera_info(at(0, 0)), None);
-        // A bag that begins anew.
+        // A bag that restarts.
         assert_eq!(next.on_camera_info(at(4, 0)), Some(at(4, 0)));
     }
 

@@ -5,7 +5,7 @@
 //! last motion of the track -> carried on to the stamp -> held against the nominal attitude -> projected
 //! ```
 //!
-//! A track gives no odometry beyond `max_gap_s`, because nobody should fly by it. A detector that looks for beacons
+//! A track gives no odometry beyond `max_gap_s`, because it is not safe to fly by. A detector that looks for beacons
 //! where they are expected needs less: where to look, and how far around. So the last motion is kept beyond the end
 //! of its track. What first becomes unknown is the attitude; then the nominal one takes its place, at the last range.
 
@@ -91,7 +91,7 @@ impl Predictor {
         }
     }
 
-    /// Returns where the markers are expected in the image of a stamp; empty where nobody knows.
+    /// Returns where the markers are expected in the image of a stamp; empty where that is unknown.
     pub(super) fn points(
         &self,
         stamp: Stamp,
@@ -167,7 +167,7 @@ fn of_pose_alone(stamp: Stamp, solution: &Solution) -> Option<LastMotion> {
 /// Returns a predicted pose held against the nominal attitude, and its covariance.
 ///
 /// The nominal attitude counts as a measurement of 5° on each axis, and of as much more as the attitude was off when
-/// it was last seen: a tanker that flies crooked, or a mount that is told wrong, goes on being so. While the track
+/// it was last seen: a tanker that flies off its nominal attitude, or a wrong mount, stays so. While the track
 /// knows the attitude better, this changes next to nothing.
 fn with_nominal_attitude(
     predicted: &Motion,

@@ -7,10 +7,10 @@ use crate::text::{clip, digits, list, quoted};
 
 /// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
 pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
-/// px; beyond this a detection says nothing.
+/// px; beyond this a detection carries no information.
 pub(super) const MAX_SIGMA_PX: f64 = 1e3;
 
-/// Why a frame gives no pose. Each says what was expected and what came.
+/// Why a frame gives no pose. Each names the expected and the received value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -48,7 +48,7 @@ pub enum Refusal {
     InvalidId {
         /// What would do.
         expected: &'static str,
-        /// What came.
+        /// The received value.
         got: String,
     },
     /// Tags that are not on the tanker.
@@ -112,7 +112,7 @@ pub enum Refusal {
     OutsideImage {
         /// Marker id.
         id: u32,
-        /// What was expected and what came.
+        /// The expected and the received value.
         reason: String,
     },
     /// The estimate failed.
@@ -147,7 +147,7 @@ pub enum Refusal {
         unclear: Vec<u32>,
     },
     /// The frame shows a marker that is left out too often for wrong detections.
-    #[error("expected markers to be left out now and then, but {0}")]
+    #[error("expected markers to be left out only occasionally, but {0}")]
     SuspectMarker(SuspectMarker),
     /// A second pose fits nearly as well.
     #[error(
@@ -186,7 +186,7 @@ impl Refusal {
             Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
         }
     }
-    /// Returns whether it is for what the header says, or for want of a camera that it could fit.
+    /// Returns whether it concerns the header, or a missing camera for it.
     #[must_use]
     pub fn is_of_header(&self) -> bool {
         matches!(

@@ -1,4 +1,4 @@
-//! How the detections of a frame lie about its best fit, for whoever asks why it is not trusted.
+//! How the detections of a frame lie about its best fit, to explain why it is not trusted.
 
 use nalgebra::Vector2;
 

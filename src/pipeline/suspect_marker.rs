@@ -1,8 +1,8 @@
-//! What is said of a marker that is left out in frame after frame.
+//! The message about a marker that is left out in many frames.
 
 use std::fmt;
 
-/// A marker that is left out too often to be a wrong detection. It displays as what that means.
+/// A marker that is left out too often to be a wrong detection. Its `Display` explains the causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SuspectMarker {
     /// Marker id.
@@ -17,8 +17,8 @@ impl fmt::Display for SuspectMarker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "marker {} was left out of {:.0}% of the frames that show it, for {:.0} s: its place in the marker map or the \
-             calibration (camera_info) is wrong, the airframe bends there, or the detector takes something else for it",
+            "marker {} was left out of {:.0}% of the frames that show it, for {:.0} s: its position in the marker map or the \
+             calibration (camera_info) is wrong, the airframe bends there, or the detector mistakes something else for it",
             self.id,
             100.0 * self.share,
             self.lasted_s

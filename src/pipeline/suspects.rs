@@ -1,13 +1,13 @@
-//! Markers that are left out in frame after frame: not a wrong detection now and then, but a wrong place in the map, an
+//! Markers that are left out in many frames: not a wrong detection now and then, but a wrong place in the map, an
 //! airframe that bends, a wrong calibration, or a detector that takes something else for them.
 //!
-//! Nobody knows which, and of all but the last the other markers are wrong too. So while that lasts no pose of a frame
+//! The cause is unknown, and with all but the last the other markers are wrong too. So while that lasts no pose of a frame
 //! that shows such a marker is trusted, whether it rests on the marker or not.
 
 use super::{FrameOutcome, Refusal, Stamp, SuspectMarker};
 use crate::estimation::Solution;
 
-/// s; what is older than this counts for little.
+/// s; time constant of the sums.
 const MEMORY_S: f64 = 3.0;
 /// s; longest step by which anything fades: where nothing is seen nothing is mended.
 const MAX_FADE_S: f64 = 1.0;
@@ -15,7 +15,7 @@ const MAX_FADE_S: f64 = 1.0;
 const MANY_OF_ALL: f64 = 0.3;
 /// A share below this says that it was one.
 const NOT_MANY: f64 = 0.2;
-/// Fewer, and it is over.
+/// Share below which it is over.
 const FEW_OF_ALL: f64 = 0.1;
 /// s; how long it must be left out so often.
 const LASTING_S: f64 = 3.0;
@@ -48,7 +48,7 @@ impl Record {
     fn take(&mut self, left_out: f64, now_s: f64) {
         let passed_s = now_s - self.latest_s;
         if passed_s < 0.0 {
-            // A recording that begins anew, or a late image.
+            // A recording that restarts, or a late image.
             self.run = None;
         }
         let left = (-passed_s.clamp(0.0, MAX_FADE_S) / MEMORY_S).exp();

@@ -79,7 +79,7 @@ impl Widening {
     ) {
         let latest_s = self.earlier.back().map(|(time_s, _)| *time_s);
         if latest_s.is_some_and(|latest_s| now_s < latest_s) {
-            // A recording that begins anew, or a late image.
+            // A recording that restarts, or a late image.
             self.earlier.clear();
         }
         while (self.earlier.get(1)).is_some_and(|(time_s, _)| now_s - time_s >= LAG_S) {

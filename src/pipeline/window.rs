@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-/// s; what is older says nothing about now.
+/// s; older fits are stale.
 pub(super) const WINDOW_S: f64 = 10.0;
-/// s; of frames that come faster some are passed over, which bounds their number.
+/// s; of frames that come faster some are skipped, which bounds their number.
 const LEAST_STEP_S: f64 = 0.002;
 
 /// Ratios of the last seconds: each a chi-squared over its median.
@@ -30,7 +30,7 @@ impl Window {
         if let Some((latest_s, _)) = self.ratios.back()
             && now_s < *latest_s
         {
-            // A recording that begins anew.
+            // A recording that restarts.
             self.ratios.clear();
         }
         let ratio = chi_squared / median_of_chi_squared(degrees_of_freedom);

@@ -10,7 +10,7 @@ use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
 
 /// A cause explains a deviation when it leaves no more than this share of it.
 const EXPLAINED: f64 = 1.0 / 3.0;
-/// deg; causes that leave nearly the same cannot be told apart.
+/// deg; causes that leave nearly the same cannot be distinguished.
 const AS_GOOD_DEG: f64 = 2.0;
 /// Most causes that are named.
 const MOST_CAUSES: usize = 3;
@@ -130,7 +130,7 @@ impl ExpectedAttitude {
     /// Returns the causes that explain a deviation, or else the mount that would.
     fn explanation(&self, deviation: &UnitQuaternion<f64>) -> String {
         let turn = deviation.to_rotation_matrix();
-        // What was seen, whatever mount it is told by.
+        // The observation, independent of the assumed mount.
         let camera_body_from_tanker =
             self.mount.rotation().inverse() * turn * self.nominal.rotation();
         let left_deg = |cause: &Cause| {
@@ -149,13 +149,13 @@ impl ExpectedAttitude {
             .iter()
             .take_while(|(left, _)| *left <= best + AS_GOOD_DEG)
             .take(MOST_CAUSES)
-            .map(|(left, cause)| format!("{} ({left:.1}° off then)", cause.words))
+            .map(|(left, cause)| format!("{} (then {left:.1}° off)", cause.words))
             .collect();
         if named.is_empty() {
             let mount = Angles::of(&(turn.inverse() * self.mount.rotation()));
             return format!(
-                "no single sign or axis explains it; if the tanker does fly at its nominal attitude, the camera_mount is \
-                 {mount} and not {}",
+                "no single sign or axis explains it; if the tanker flies at its nominal attitude, camera_mount is \
+                 {mount} rather than {}",
                 self.mount
             );
         }
@@ -212,7 +212,7 @@ impl ExpectedAttitude {
             > 1
         {
             let inverse = Angles::of(&self.mount.rotation().inverse());
-            let words = "camera_mount given the other way round (of the receiver in the camera)";
+            let words = "camera_mount given as the inverse (the receiver in the camera)";
             causes.push(of_mount(words.to_owned(), inverse));
         }
         for turn_deg in [180.0, 90.0, -90.0] {
@@ -344,7 +344,7 @@ mod tests {
             Angles::default(),
         );
         let (_, words) = found(&told, &truth, truth.nominal);
-        assert!(words.contains("given the other way round"), "{words}");
+        assert!(words.contains("given as the inverse"), "{words}");
 
         for (mount, nominal) in [
             (angles(0.0, 5.0, 0.0), Angles::default()),

@@ -125,7 +125,7 @@ impl RefuellingGeometry {
 
     /// Returns the receptacle's motion in the receiver, about the receiver's origin: its attitude is that
     /// of the tanker. The covariance holds that of the mount too, and in the position the
-    /// receptacle's own deviation from its place, of whose motion nothing is known.
+    /// receptacle's own deviation from its position, whose motion is unknown.
     #[must_use]
     pub fn receptacle_motion(&self, camera_from_tanker: &Motion) -> Motion {
         let tanker_from_receptacle = Isometry3::from_parts(

@@ -25,7 +25,7 @@ use crate::yaml::{self, Place, YamlError};
 const FARTHEST_M: f64 = 1000.0;
 /// m; a receptacle that is less certain than this has no place.
 const LARGEST_SIGMA_M: f64 = 100.0;
-/// deg; beyond it a covariance says nothing.
+/// deg; beyond it a covariance is meaningless.
 const LARGEST_SIGMA_DEG: f64 = 10.0;
 
 /// Why a refuelling setup cannot be used; each message begins with the place at fault.

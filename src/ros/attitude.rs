@@ -1,4 +1,4 @@
-//! The topic that brings the receiver's attitude, of one of two types, or none.
+//! The topic of the receiver's attitude, of one of two types.
 
 use std::pin::Pin;
 

@@ -50,7 +50,7 @@ impl fmt::Display for CameraState {
     }
 }
 
-/// What has happened since the node began.
+/// Counts since the node's start.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Tally {
     /// Frames by outcome, in the order of [`OutcomeCode::ALL`].
@@ -59,15 +59,15 @@ pub struct Tally {
     tracks: [u64; TrackCode::ALL.len()],
     /// Camera infos received.
     pub camera_infos: u64,
-    /// Detections that came while the node was not active, and were not looked at.
+    /// Detections received while the node was not active; not processed.
     pub unanswered: u64,
     /// Samples that could not be decoded.
     pub undecodable: u64,
-    /// Samples that were passed over because more waited than the topic's depth.
+    /// Samples that were skipped because more waited than the topic's depth.
     pub lost: u64,
     /// Messages not sent because a subscriber did not keep up, or for an error.
     pub dropped: u64,
-    /// Topics on which there were such since the last report, and why.
+    /// Topics with such messages since the last report, and why.
     dropping: BTreeMap<String, String>,
 }
 
@@ -195,7 +195,9 @@ fn judge(frames: u64, estimates: u64, dropped: u64, situation: &Situation) -> (u
     } else if frames == 0 {
         let message = match situation.publishers {
             0 => format!("no {input}: no publisher"),
-            n => format!("no {input}, though {n} publisher(s) exist: check type, QoS and network"),
+            n => {
+                format!("no {input}, although {n} publisher(s) exist: check type, QoS and network")
+            }
         };
         (DiagnosticStatus::STALE, message)
     } else if estimates == 0 {
@@ -300,7 +302,7 @@ fn values(tally: &Tally, rates: [(&str, String); 3], situation: &Situation) -> V
     let owned = |(key, value): (&str, String)| (key.to_owned(), value);
     pairs.extend(rates.into_iter().map(owned));
     pairs.extend(measured.into_iter().map(owned));
-    // All of them, also those at zero: who plots a value needs its key from the beginning.
+    // All of them, also those at zero: a plot needs its key from the beginning.
     pairs.extend(
         OutcomeCode::ALL
             .iter()

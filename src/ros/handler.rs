@@ -87,7 +87,7 @@ impl Handler {
             detections,
         };
         let outcome = self.pipeline.process(&frame);
-        // A frame whose name is too long for that is refused, so no pose has a cut one.
+        // A frame with a longer name is refused, so no pose has a cut one.
         let header = Header {
             frame_id: echoed(header.frame_id),
             ..header
@@ -114,7 +114,7 @@ impl Handler {
             predicted.on_detections(&header, &self.pipeline, &mut self.monitor.tally);
         }
         self.monitor.on_residuals(&answer, &self.pipeline);
-        // Last: they are for people, who don't wait for a millisecond.
+        // Last: they are for display, where a millisecond does not matter.
         self.publish_markers(&header, &frame, &outcome);
         self.monitor.on_published(&answer);
     }
@@ -151,12 +151,12 @@ impl Handler {
         self.monitor.on_reset();
     }
 
-    /// Takes note of a sample on `topic` that could not be decoded.
+    /// Records a sample on `topic` that could not be decoded.
     pub(super) fn on_undecodable(&mut self, topic: &str, error: &ros2_client::ReadError) {
         self.monitor.on_undecodable(topic, self.input(), error);
     }
 
-    /// Takes note of samples on `topic` that were passed over because newer ones waited behind them.
+    /// Records samples on `topic` that were skipped because newer ones waited behind them.
     pub(super) fn on_lost(&mut self, topic: &str, count: u64) {
         self.monitor.on_lost(topic, count);
     }
@@ -232,7 +232,7 @@ impl Handler {
             .publish(message, &mut self.monitor.tally);
     }
 
-    /// Says so when camera and tanker have the same frame: nobody could tell which one is meant.
+    /// Warns when camera and tanker have the same frame, which makes poses meaningless.
     fn is_own_child(&mut self, header: &Header) -> bool {
         let child = &self.outputs.tanker_frame_id;
         let is_same = *child == header.frame_id;

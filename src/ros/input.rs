@@ -1,4 +1,4 @@
-//! Where detections come from: one topic, of one of three types, and what its messages say.
+//! The input: one topic, of one of three types, and how its messages are read.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -73,12 +73,12 @@ impl InputSubscription {
     }
 }
 
-/// What one message says.
+/// The content of one message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Time of the image and the camera's optical frame.
     pub header: Header,
-    /// The detections, unchecked, or why they cannot be told.
+    /// The detections, unchecked, or why they cannot be read.
     pub detections: Result<Vec<Detection>, Refusal>,
     /// Ids of points that were left out before any estimate.
     pub ignored_ids: Vec<u32>,
@@ -95,7 +95,7 @@ pub struct InputReader {
 }
 
 impl InputReader {
-    /// Returns what a message says.
+    /// Returns the content of a message.
     #[must_use]
     pub fn read(&self, message: InputMessage) -> Sighting {
         let (header, detections, ignored_ids) = match message {

@@ -30,7 +30,7 @@ pub(super) struct Answer<'a> {
     pub(super) begin: Instant,
 }
 
-/// What a report needs of those whose health it is.
+/// The parts of the node that a report describes.
 pub(super) struct Subject<'a> {
     /// Whether detections are answered.
     pub(super) active: bool,
@@ -44,7 +44,7 @@ pub(super) struct Subject<'a> {
 
 /// Keeps the node's health.
 pub(super) struct Monitor {
-    /// What has happened, for whoever publishes.
+    /// Counts for the publishers.
     pub(super) tally: Tally,
     node: String,
     clock: NodeClock,
@@ -91,7 +91,7 @@ impl Monitor {
         &self.node
     }
 
-    /// Takes note of a camera info that the pipeline has taken; `is_new`: it can be used, and differs from the one before.
+    /// Records a camera info that the pipeline has taken; `is_new`: it can be used, and differs from the one before.
     pub(super) fn on_camera_info(&mut self, pipeline: &Pipeline, is_new: bool) {
         let now = Instant::now();
         self.tally.camera_infos += 1;
@@ -112,7 +112,7 @@ impl Monitor {
         }
     }
 
-    /// Takes note of what the latest camera info comes to, and says what of it is new.
+    /// Records what the latest camera info comes to, and says what of it is new.
     pub(super) fn on_camera(&mut self, pipeline: &Pipeline) {
         let state = match pipeline.camera() {
             None => CameraState::Missing,
@@ -137,18 +137,18 @@ impl Monitor {
         self.camera = state;
     }
 
-    /// Takes note of a sample that could be decoded.
+    /// Records a sample that could be decoded.
     pub(super) fn on_decoded(&mut self, topic: &str) {
         self.watch.on_decoded(topic);
     }
 
-    /// Takes note of detections, answered or not.
+    /// Records detections, answered or not.
     pub(super) fn on_detections(&mut self, topic: &str, now: Instant) {
         self.watch.on_detections(now);
         self.watch.on_decoded(topic);
     }
 
-    /// Takes note of what became of a frame; returns how the tanker's attitude is off what is expected, if it is.
+    /// Records what became of a frame; returns how the tanker's attitude is off what is expected, if it is.
     pub(super) fn on_answer(&mut self, answer: &Answer) -> Option<Unexpected> {
         let (outcome, now) = (answer.outcome, answer.begin);
         let stamp = Time::from(answer.frame.stamp);
@@ -170,7 +170,7 @@ impl Monitor {
         self.watch.on_attitude(rotation, now)
     }
 
-    /// Takes note of how well a frame's residuals agree with what is stated, once it has been answered.
+    /// Records how well a frame's residuals agree with what is stated, once it has been answered.
     pub(super) fn on_residuals(&mut self, answer: &Answer, pipeline: &Pipeline) {
         self.watch
             .on_outcome(answer.outcome, pipeline, answer.begin);
@@ -217,7 +217,7 @@ impl Monitor {
         }
     }
 
-    /// Takes note that everything is published that follows from a frame.
+    /// Records that everything is published that follows from a frame.
     pub(super) fn on_published(&mut self, answer: &Answer) {
         let end = Instant::now();
         let taken = end.saturating_duration_since(answer.begin);
@@ -228,7 +228,7 @@ impl Monitor {
         }
     }
 
-    /// Returns how old an image is by the node's time; `None` while that stands still for want of `/clock`.
+    /// Returns the age of an image by the node's time; `None` while that does not advance for lack of `/clock`.
     fn age_of(&self, stamp: Time) -> Option<ImageAge> {
         let silence = self.clock.silence();
         if silence.is_some_and(|silence| !silence.ever) {
@@ -241,7 +241,7 @@ impl Monitor {
         })
     }
 
-    /// Takes note of what a configuration means for faults, and says what of it is new: mount, lever arms and nominal
+    /// Records what a configuration means for faults, and says what of it is new: mount, lever arms and nominal
     /// attitude in words, and what would refuse every frame from now on. `outputs` is the geometry of outputs that are
     /// held back while the tanker's attitude is not the expected one.
     pub(super) fn understand(
@@ -271,13 +271,13 @@ impl Monitor {
         self.needed_points = need;
     }
 
-    /// Takes note that the track and the last attitude are forgotten.
+    /// Records that the track and the last attitude are forgotten.
     pub(super) fn on_reset(&mut self) {
         self.watch.on_reset();
-        log::info!("track and last attitude were reset by a call of ~/reset");
+        log::info!("track and last attitude were reset by ~/reset");
     }
 
-    /// Takes note of a sample on `topic` that could not be decoded; `input` is the topic of the detections.
+    /// Records a sample on `topic` that could not be decoded; `input` is the topic of the detections.
     pub(super) fn on_undecodable(
         &mut self,
         topic: &str,
@@ -292,7 +292,7 @@ impl Monitor {
         self.watch.on_undecodable(topic, error, now);
     }
 
-    /// Takes note of samples on `topic` that were passed over because newer ones waited behind them.
+    /// Records samples on `topic` that were skipped because newer ones waited behind them.
     pub(super) fn on_lost(&mut self, topic: &str, count: u64) {
         self.tally.lost += count;
         self.watch.on_lost(topic, count, Instant::now());

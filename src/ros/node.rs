@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments, environment: &Environment) -> Result<(), NodeE
 
 /// Runs the node until `stop` ends, and leaves the graph: for programs that have a node in a thread of theirs.
 ///
-/// Signals and logging are the caller's: without [`logging::start`] before, nothing is said anywhere.
+/// Signals and logging are the caller's: without [`logging::start`] before, nothing is logged.
 ///
 /// # Errors
 /// [`NodeError`] when it cannot start; once it runs, nothing ends it but `stop` and the end of the middleware.
@@ -55,7 +55,7 @@ pub fn run_until(
 ) -> Result<(), NodeError> {
     let (names, mut start) = effective_parameters(arguments)?;
     let configuration = Configuration::from(&start.parameters);
-    // What is wrong with fixed parameters, no transition can mend.
+    // No transition can correct fixed parameters.
     config::check_together(&start.parameters)?;
     start.leave_topics(&topics::opened(&names, &configuration)?);
     // A managed node reads its files when it is configured.
@@ -83,7 +83,7 @@ pub fn run_until(
             Some(files) => server.start(&configuration, files),
             None => server.start_managed(),
         })
-        // Parameters last: who finds the services finds the topics too.
+        // Parameters last: a client that finds the services finds the topics too.
         .and_then(|()| {
             let reset = ResetService::open(server.ros())?;
             let services = ParameterServices::open(server.ros(), &parameters, &clock)?;

@@ -29,7 +29,7 @@ pub struct Outputs {
     pub predicted_points: Option<PredictedPoints>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
-    /// What refuelling and flight stacks are told, if wanted.
+    /// Outputs for refuelling and flight stacks, if enabled.
     pub consumers: Option<Consumers>,
 }
 

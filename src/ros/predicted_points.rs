@@ -22,7 +22,7 @@ impl PredictedPoints {
         }
     }
 
-    /// Answers a camera info, whose image is on its way through the detector.
+    /// Answers a camera info, whose image the detector is processing.
     pub(super) fn on_camera_info(
         &mut self,
         header: &Header,
@@ -46,9 +46,9 @@ impl PredictedPoints {
         }
     }
 
-    /// Publishes what is predicted, also when that is nothing: who waits for it need not wait longer.
+    /// Publishes the prediction, even if it is empty, so that a detector need not wait.
     fn publish(&mut self, stamp: Stamp, frame_id: &str, pipeline: &Pipeline, tally: &mut Tally) {
-        // A frame that is not of this camera is told so by its status.
+        // The status of a frame of another camera states that.
         let Ok(points) = pipeline.predict(stamp, frame_id) else {
             return;
         };

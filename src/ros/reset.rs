@@ -1,4 +1,4 @@
-//! `~/reset`: who knows that the past says nothing about the next frame can say so.
+//! `~/reset`: discards the track and the last attitude.
 
 use smol::channel::{Receiver, bounded};
 

@@ -240,14 +240,14 @@ impl<'a> Server<'a> {
         let files = match Files::read(&configuration) {
             Ok(files) => files,
             Err(error) => {
-                log::error!("cannot be configured: {error}");
+                log::error!("configuration failed: {error}");
                 return WorkResult::Failure;
             }
         };
         match self.configure(&configuration, files) {
             Ok(()) => WorkResult::Success,
             Err(error) => {
-                log::error!("cannot be configured: {}", NodeError::from(error));
+                log::error!("configuration failed: {}", NodeError::from(error));
                 WorkResult::Error
             }
         }

@@ -335,7 +335,7 @@ markers:
             ),
             (
                 format!("{}  - {{name: wing, sigma: 0.1, shape: []}}\n", shape("")),
-                "m.yaml:10:12: flex mode `wing` stands twice",
+                "m.yaml:10:12: flex mode `wing` is defined twice",
             ),
         ];
         for (more, expected) in slips {

@@ -107,7 +107,7 @@ pub enum MarkerMapError {
         id: u32,
         family: String,
     },
-    /// A standard deviation that is none, or in another unit.
+    /// A standard deviation that is not one, or in another unit.
     #[error("{place}: {of} must be 0 to {most_m} m, got {value_m}")]
     Sigma {
         place: Place,
@@ -145,7 +145,7 @@ pub enum MarkerMapError {
         most: f64,
     },
     /// One name for two modes.
-    #[error("{place}: flex mode `{name}` stands twice")]
+    #[error("{place}: flex mode `{name}` is defined twice")]
     DuplicateFlex { place: Place, name: String },
     /// More modes than the estimator has room for.
     #[error("{place}: a map may have at most {most} flex modes, got {got}")]

@@ -28,7 +28,7 @@ fn nothing() -> Spanned<Vec<RawMarker>> {
     Spanned::new(Vec::new(), Location::UNKNOWN, Location::UNKNOWN)
 }
 
-/// `id` is wider than ids are, so that one out of range is told as such.
+/// `id` is wider than ids are, so that one out of range is reported as such.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawMarker {

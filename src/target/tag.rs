@@ -10,7 +10,7 @@ const CORNERS: [(f64, f64); 4] = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 
 
 /// A square tag on the tanker.
 ///
-/// Its frame is that of `apriltag_ros`: the origin in the tag's centre; for who looks at the upright
+/// Its frame is that of `apriltag_ros`: the origin in the tag's centre; seen from in front of the upright
 /// tag, x to the right, y up, z out of its face. The corners go round against the clock from the
 /// bottom left one, as those of `apriltag_msgs/AprilTagDetection` do.
 #[derive(Debug, Clone, PartialEq)]

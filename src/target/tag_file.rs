@@ -16,7 +16,7 @@ const MAX_SIZE_M: f64 = 100.0;
 /// How far a quaternion's length may be from 1, as ROS has it.
 const QUATERNION_TOLERANCE: f64 = 0.01;
 
-/// `id` is wider than ids are, so that one out of range is told as such.
+/// `id` is wider than ids are, so that one out of range is reported as such.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawTag {
@@ -189,7 +189,7 @@ tags:
         let text = include_str!("../../config/tankers/tags_example.yaml");
         let map = MarkerMap::from_yaml(text, "tags_example.yaml").expect("a sound example");
         assert_eq!((map.name(), map.markers().len()), ("tags_example", 13));
-        // Upright and facing aft: the first corner is at the bottom left for who looks from behind.
+        // Upright and facing aft: the first corner is at the bottom left as seen from behind.
         let corner = map.get(0).expect("the first corner of tag 0");
         assert!(
             (corner - Point3::new(3.6, -6.2, 0.3)).norm() < 1e-12,

@@ -186,7 +186,7 @@ def test_a_spoilt_map_leaves_the_node_unconfigured_until_it_is_mended(
         assert ours.state() == theirs.state() == "unconfigured"
     peer.spin_until(lambda: len(ours.events) == len(theirs.events), "the events")
     assert ours.steps() == theirs.steps()
-    assert "cannot be configured" in node.log and str(path) in node.log
+    assert "configuration failed" in node.log and str(path) in node.log
 
     path.unlink()
     assert not ours.change(CONFIGURE)
@@ -299,7 +299,7 @@ def test_what_is_configured_again_follows_the_setups_file_and_the_mount_of_now(
         assert np.allclose([position.x, position.y, position.z], truth, atol=1e-4)
 
     assert not manager.change(CONFIGURE)
-    assert "cannot be configured" in node.log and str(setup) in node.log
+    assert "configuration failed" in node.log and str(setup) in node.log
     setup.write_text(text, encoding="utf-8")
     assert manager.change(CONFIGURE) and manager.change(ACTIVATE), node.log
     expect(receptacle_from(np.array([5.0, -0.5, 1.0])))

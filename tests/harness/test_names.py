@@ -94,7 +94,7 @@ def test_another_node_name(start_node: StartNode, peer: Peer) -> None:
 @pytest.mark.parametrize(
     "argument, said",
     [
-        ("feature_points:=", "nothing stands after :="),
+        ("feature_points:=", "expected a value after :="),
         ("feature_points:=/two//slashes", "/two//slashes"),
         ("__ns:=not/absolute", "not/absolute"),
         ("no_arrow", "no_arrow"),

@@ -80,13 +80,13 @@ pub enum ArgumentError {
     Value {
         /// The argument.
         argument: &'static str,
-        /// What came behind it.
+        /// The text after it.
         value: String,
         /// What is wrong with it.
         reason: String,
     },
     /// An argument that stands last and needs another one behind it.
-    #[error("argument {argument} needs a value behind it")]
+    #[error("argument {argument} needs a value after it")]
     NoValue {
         /// The argument.
         argument: String,
@@ -144,7 +144,7 @@ impl Arguments {
     }
 
     /// Returns the arguments without those that have a value with a grammar of its own, which it keeps: the parser would
-    /// part files from assignments, read values by other rules than rcl, and pass over rules that are for nobody.
+    /// part files from assignments, read values by other rules than rcl, and ignore rules that match no node.
     ///
     /// Also drops `--log-file-name`, which ROS accepts and the parser does not: the node writes no log file.
     fn take(&mut self, arguments: &[String]) -> Result<Vec<String>, ArgumentError> {

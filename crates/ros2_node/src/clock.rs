@@ -39,7 +39,7 @@ struct Simulated {
     /// When it came, or since when it is wanted.
     since: Instant,
     jumps: Jumps,
-    /// The last jump that nobody has asked for yet.
+    /// The last jump that was not yet taken.
     jump: Option<String>,
 }
 
@@ -103,7 +103,7 @@ impl NodeClock {
 
 /// Listens to `/clock` from when `use_sim_time` is set for the first time.
 ///
-/// ros2-client has a subscription of its own to that topic, with a type that nobody publishes.
+/// ros2-client has a subscription of its own to that topic, with a type that is never published.
 pub struct SimTime {
     clock: NodeClock,
     // Kept once it is there: peers on Fast DDS do not notice that a single subscription has ended.
@@ -160,7 +160,7 @@ async fn listen(subscription: Subscription<Clock>, clock: NodeClock) {
             Err(error) => error.to_string(),
         };
         if bad_samples.fault((), Instant::now()) {
-            log::warn!("a time of {CLOCK} is not used: {fault}");
+            log::warn!("ignoring a message on {CLOCK}: {fault}");
         }
     }
 }

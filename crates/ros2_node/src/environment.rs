@@ -68,7 +68,7 @@ pub enum EnvironmentError {
     },
     /// Discovery switched off altogether.
     #[error(
-        "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: without discovery this node could neither hear \
+        "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF: without discovery this node could neither receive \
          others nor be heard; use LOCALHOST to stay on this host"
     )]
     DiscoveryOff,

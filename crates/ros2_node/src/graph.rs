@@ -107,9 +107,13 @@ fn misfit(own: &OwnEnd, other: &OtherEnd) -> Option<Misfit> {
         let (expected, got) = (ros_type(&own.type_name), ros_type(&other.type_name));
         let got = clip(&got);
         return Some(Misfit::Type(if listens {
-            format!("a publisher of {topic} sends {got}, expected {expected}: it is not heard")
+            format!(
+                "a publisher of {topic} sends {got}, expected {expected}: its messages are not received"
+            )
         } else {
-            format!("a subscriber of {topic} expects {got}, sent is {expected}: it hears nothing")
+            format!(
+                "a subscriber of {topic} expects {got}, sent is {expected}: it receives nothing"
+            )
         }));
     }
     let (offered, requested) = if listens {
@@ -122,12 +126,12 @@ fn misfit(own: &OwnEnd, other: &OtherEnd) -> Option<Misfit> {
     let name = format!("{policy:?}").to_lowercase();
     Some(Misfit::Qos(if listens {
         format!(
-            "a publisher of {topic} offers {name} {offered}, requested is {requested}: it is not heard \
+            "a publisher of {topic} offers {name} {offered}, requested is {requested}: its messages are not received \
              (see qos_overrides)"
         )
     } else {
         format!(
-            "a subscriber of {topic} requests {name} {requested}, offered is {offered}: it hears nothing \
+            "a subscriber of {topic} requests {name} {requested}, offered is {offered}: it receives nothing \
              (see qos_overrides)"
         )
     }))

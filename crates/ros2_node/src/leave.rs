@@ -40,12 +40,12 @@ impl Farewell {
         let packet = self.packet();
         let base = 7400 + 250 * u32::from(self.domain_id);
         if let Err(error) = send_to_this_host(&packet, base) {
-            log::debug!("could not announce the end on this host: {error}");
+            log::debug!("could not announce the departure on this host: {error}");
         }
         if self.range == DiscoveryRange::Subnet {
             for address in own_addresses() {
                 if let Err(error) = send_to_group(&packet, base, address) {
-                    log::debug!("could not announce the end on {address}: {error}");
+                    log::debug!("could not announce the departure on {address}: {error}");
                 }
             }
         }

@@ -22,7 +22,7 @@
 //! messages                           the messages of all this, and the trait of all messages
 //! newest                             what is left out when more samples wait than a topic's depth
 //! graph, running_nodes               the other ends of the topics; nodes that are found by what they publish
-//! logging, once                      log lines as ROS has them; what lasts is said once
+//! logging, once                      log lines as ROS has them; lasting conditions are logged once
 //! text, text_file                    foreign words in messages for people; files from outside
 //! ```
 //!

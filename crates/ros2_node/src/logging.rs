@@ -23,7 +23,7 @@ use crate::text;
 /// apart.
 const DEFAULT_FILTER: &str = "warn,rustdds=error,rustdds::structure::dds_cache=off,\
     ros2_client=error,ros2_client::distributions=off,cdr_encoding=error";
-/// This crate's own lines are said by the node, too.
+/// This crate's own lines are logged under the node's name, too.
 const KIT: &str = "ros2_node";
 /// Where the client library repeats what it published to /rosout.
 const ECHO: &str = "ros2_client::rosout";

@@ -1,7 +1,7 @@
 //! The newest samples of a topic when more wait than its depth.
 //!
 //! `RustDDS` keeps 64 samples of a topic at least, clears them away at every 64th only, and so hands over up to about
-//! 128 of them after a pause. What is older than the depth that was asked for is passed over here, and counted.
+//! 128 of them after a pause. What is older than the depth that was asked for is skipped here, and counted.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ use futures::stream::{FusedStream, Stream};
 /// Most samples that are looked at before one is handed over: a flood must not stop the node's loop.
 const MOST: usize = 1024;
 
-/// How many samples were passed over since that was asked last.
+/// How many samples were skipped since that was asked last.
 #[derive(Debug, Clone, Default)]
 pub struct Lost(Rc<Cell<u64>>);
 

@@ -1,9 +1,9 @@
-//! A fault that lasts is said once, not at every frame.
+//! A log gate: a fault that lasts is logged once, not at every frame.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// A fault that comes and goes faster than this is said at this pace.
+/// A fault that comes and goes faster than this is logged at this interval.
 const QUIET: Duration = Duration::from_secs(5);
 
 /// Decides what is worth a log line when many things are judged good or faulty, one after the other.
@@ -40,7 +40,7 @@ impl<Fault: Copy + Ord> SaidOnce<Fault> {
         true
     }
 
-    /// Takes note of a good thing; returns how many were faulty before it if the end of a fault is to
+    /// Records a good thing; returns how many were faulty before it if the end of a fault is to
     /// be said now.
     pub fn good(&mut self) -> Option<u64> {
         self.open.take().map(|_| std::mem::take(&mut self.faulty))

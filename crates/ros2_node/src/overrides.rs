@@ -71,7 +71,7 @@ impl std::fmt::Display for Place {
 pub struct Overrides {
     /// One for each parameter, the one that counts.
     pub values: Vec<Override>,
-    /// What ROS passes over, and nobody would see.
+    /// A value that ROS ignores silently.
     pub repetitions: Vec<Repetition>,
     /// Files without a section for this node.
     pub files_without_section: Vec<PathBuf>,

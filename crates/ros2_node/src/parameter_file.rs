@@ -175,7 +175,7 @@ fn parse(text: &str, path: &Path) -> Result<Vec<Section>, ParameterFileError> {
 
 /// Appends every section; names nest as namespaces.
 ///
-/// A name that ROS does not know may be meant for this node, so it is not passed over.
+/// A name that ROS does not know may be meant for this node, so it is not skipped.
 fn sections(
     tree: &Tree,
     written: &str,
@@ -195,7 +195,7 @@ fn sections(
             }
             Ok(())
         }
-        // An empty file, or a node without anything, says nothing.
+        // An empty file, or a node without anything, sets no parameter.
         Value::Scalar(None) => Ok(()),
         Value::Scalar(Some(_)) | Value::List => Err(ParameterFileError::NoParameters {
             path: path.to_owned(),

@@ -247,7 +247,7 @@ impl RosNode {
         })
     }
 
-    /// Returns the quality of service that the end of a topic opens with, and takes note of that end.
+    /// Returns the quality of service that the end of a topic opens with, and records that end.
     fn qos<M: Message>(
         &mut self,
         topic: &str,

@@ -116,7 +116,7 @@ pub fn sequence_number(number: i64) -> [u8; 8] {
     bytes
 }
 
-/// Whoever builds a message keeps it below what UDP carries.
+/// The caller keeps a message below what UDP carries.
 fn length(bytes: &[u8]) -> u16 {
     u16::try_from(bytes.len()).unwrap_or(u16::MAX)
 }

@@ -1,7 +1,7 @@
 //! One ROS argument's value: `node:name:=value`, `node:from:=to`, `logger:=level`, an enclave.
 //!
 //! The grammar is that of rcl's lexer, as rclpy shows it. It is checked for rules of other nodes, too: a rule that is for
-//! nobody, as `/**:name:=value` is, would be passed over without a word.
+//! no node, such as `/**:name:=value`, would be ignored silently.
 
 use log::LevelFilter;
 use ros2args::RemapRule;
@@ -38,7 +38,7 @@ pub(super) fn assignment(argument: &str) -> Result<Assignment, String> {
     check_node(node)?;
     if !is_parameter(name) {
         return Err(format!(
-            "{:?} is no name of a parameter: it has letters, digits, single _ and dots",
+            "{:?} is not a parameter name: expected letters, digits, single _ and dots",
             clip(name)
         ));
     }
@@ -68,7 +68,10 @@ pub(super) fn remap(argument: &str) -> Result<RemapRule, String> {
             .unwrap_or(from);
         for side in [name, to] {
             if !is_topic(side) {
-                return Err(format!("{:?} is no name of a topic or service", clip(side)));
+                return Err(format!(
+                    "{:?} is not a name of a topic or service",
+                    clip(side)
+                ));
             }
         }
     }
@@ -120,7 +123,7 @@ pub(super) fn is_enclave(path: &str) -> bool {
 fn sides(argument: &str) -> Result<(&str, &str), String> {
     let (left, right) = argument.split_once(":=").ok_or("it has no :=")?;
     if right.is_empty() {
-        return Err("nothing stands after :=".to_owned());
+        return Err("expected a value after :=".to_owned());
     }
     Ok((left, right))
 }

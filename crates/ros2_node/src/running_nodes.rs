@@ -94,7 +94,7 @@ impl Domain {
                 .topic_name()
                 .strip_prefix("rq")
                 .and_then(|service| service.strip_suffix(NAMING_SERVICE));
-            // Known by what it publishes: what only listens is nobody's node.
+            // Known by what it publishes: a participant that only subscribes is not a node of ours.
             if let Some(node) = node
                 && let Some(process) = processes.get_mut(&id(&data.key().to_bytes()))
             {

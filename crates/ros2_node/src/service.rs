@@ -4,7 +4,7 @@
 //! not fit the path's MTU, about 1250 bytes of 1500, and writes that identity into the pieces with one byte
 //! too many: no other implementation can read them, and the client waits forever. A long reply is therefore
 //! sent here as one sample in one UDP datagram, which the network splits and joins below RTPS. A short
-//! placeholder, meant for nobody, takes its place in the writer's sequence, so that the writer's own
+//! placeholder, addressed to no client, takes its place in the writer's sequence, so that the writer's own
 //! bookkeeping holds.
 //!
 //! What that costs: a long reply is not repeated when it is lost on the way.
@@ -217,7 +217,7 @@ impl Replies {
             return Err(ReplyError::TooLong { length });
         }
         let sent = self.send_datagrams(request, &readers, &payload);
-        // Meant for nobody: no client has this identity.
+        // Addressed to no client: none has this identity.
         self.write(RmwRequestId::default(), nothing).await?;
         sent.map_err(|reason| ReplyError::Datagram { length, reason })
     }

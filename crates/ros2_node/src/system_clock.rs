@@ -1,6 +1,6 @@
 //! Detects backward steps of the system clock, which silence best-effort inputs.
 //!
-//! `RustDDS` files samples by the time at which they come, and hands a best-effort input those up to now. What came
+//! `RustDDS` orders samples by their time of arrival, and gives a best-effort input those up to now. Those that arrived
 //! before the clock was set back lies in its future, and so does all that comes until the clock has caught up.
 
 use std::time::{Duration, Instant, SystemTime};

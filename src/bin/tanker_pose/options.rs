@@ -208,7 +208,7 @@ pub enum CalibrationError {
     Budget(#[from] CalibrationBudgetError),
 }
 
-/// Returns the camera info of a calibration file; what was assumed or passed over is logged.
+/// Returns the camera info of a calibration file; what was assumed or skipped is logged.
 pub fn calibration(path: &Path) -> Result<CameraInfo, CalibrationError> {
     let text = text_file::read(path).map_err(|source| CalibrationError::Unreadable {
         path: path.to_owned(),

@@ -22,7 +22,7 @@ pub struct Arguments {
     ros: RosOptions,
 }
 
-/// Why there are none to print.
+/// Why no parameters can be printed.
 #[derive(Debug, thiserror::Error)]
 pub enum ParametersError {
     #[error(transparent)]

@@ -85,7 +85,7 @@ impl BrownConrady {
     /// [`MAX_STRETCH`], or at which the denominator has a root; at most that of 89°. All are roots of polynomials in
     /// `s`.
     ///
-    /// How small the denominator is says nothing: calibrations often give a numerator and a denominator that nearly
+    /// The size of the denominator is no criterion: calibrations often give a numerator and a denominator that nearly
     /// cancel, both close to 0 where their ratio is close to 1. A pole is a root, and before it the stretch grows
     /// without bound.
     fn radial_limit(&self) -> f64 {

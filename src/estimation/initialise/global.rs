@@ -44,7 +44,7 @@ struct FourRotations {
 pub(crate) struct Minima {
     /// Minima with the markers' mean in front of the camera, best first.
     pub(crate) in_front: [Option<Minimum>; MAX_MINIMA],
-    /// The best minimum behind the camera, for saying why there is none in front.
+    /// The best minimum behind the camera, for the error when there is none in front.
     pub(crate) behind: Option<Minimum>,
     /// Of all descents together that were not given up.
     pub(crate) iterations: u16,

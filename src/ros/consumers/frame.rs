@@ -1,4 +1,4 @@
-//! What each output makes of a frame.
+//! Each output's message for a frame.
 
 use super::silence::Silence;
 use crate::frames::{LocalAttitude, PoseEstimate};
@@ -20,11 +20,11 @@ pub(super) struct Frame<'a> {
     pub(super) receiver: &'a str,
     /// The track at the stamp, if the frame has corrected it.
     pub(super) camera_from_tanker: Result<&'a Motion, Silence>,
-    /// Where the frame alone has the receptacle.
+    /// The receptacle from this frame alone.
     pub(super) target: PoseEstimate,
-    /// How the receiver is turned at the stamp.
+    /// The receiver's attitude at the stamp.
     pub(super) attitude: Result<LocalAttitude, Silence>,
-    /// What PX4's clock shows more than ROS's, µs.
+    /// PX4's clock minus ROS's, µs.
     pub(super) px4_minus_ros_us: i64,
 }
 

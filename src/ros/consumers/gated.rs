@@ -1,4 +1,4 @@
-//! One output, how often it spoke, and why it did not.
+//! One output, how often it was published, and why it was not.
 
 use std::time::Instant;
 
@@ -14,13 +14,13 @@ use crate::ros::topics::Topic;
 
 /// An output of whatever message.
 pub(super) trait GatedOutput {
-    /// Publishes what the output makes of a frame, or takes note of why there is nothing.
+    /// Publishes the message for a frame, or records why there is none.
     fn publish(&mut self, frame: &Result<Frame, Silence>, tally: &mut Tally);
 
     /// Forgets counts and reasons.
     fn reset(&mut self);
 
-    /// Returns counts, and the reason of the last silence since the last report.
+    /// Returns counts, and why the output was last held back since the last report.
     fn report(&mut self, values: &mut Vec<KeyValue>) -> Option<String>;
 }
 
@@ -45,7 +45,7 @@ pub(super) fn open<M: Message>(
     }))
 }
 
-/// An output with what became of its frames.
+/// An output with the counts of its frames.
 struct Gated<M: Message> {
     output: Output<M>,
     message: fn(&Frame) -> Result<M, Silence>,
@@ -67,7 +67,10 @@ impl<M: Message> GatedOutput for Gated<M> {
                 self.published += 1;
                 self.output.publish(message, tally);
                 if let Some(count) = self.log_gate.good() {
-                    log::info!("{} again after {count} frames without it", self.name);
+                    log::info!(
+                        "{} published again after {count} frames without it",
+                        self.name
+                    );
                 }
             }
             Err(silence) => {

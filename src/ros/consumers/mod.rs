@@ -1,8 +1,8 @@
-//! What refuelling and flight stacks are told of a frame: each output by its own parameter, and silence with a
-//! reason where something is missing.
+//! Outputs for refuelling and flight stacks: each is enabled by its own parameter, and held back with a reason where
+//! something is missing.
 //!
 //! States (`receptacle`, PX4's landing target) come from the track. What a flight stack feeds to a filter of its
-//! own (PX4's marker report, MAVROS) comes from single frames: a filter behind a filter believes too much.
+//! own (PX4's marker report, MAVROS) comes from single frames: two filters in series would be overconfident.
 
 mod frame;
 mod gated;
@@ -30,11 +30,11 @@ use frame::Frame;
 use gated::GatedOutput;
 use silence::Silence;
 
-/// Why the outputs cannot be.
+/// Why the outputs cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConsumersError {
-    /// Parameters that do not go together.
+    /// Inconsistent parameters.
     #[error(transparent)]
     Outputs(#[from] OutputError),
     /// The setup's file.
@@ -80,7 +80,7 @@ pub struct Consumers {
 }
 
 impl Consumers {
-    /// Returns the outputs of a configuration, opened; `None` when it asks for none.
+    /// Returns the outputs of a configuration, opened; `None` when all are off.
     ///
     /// # Errors
     /// [`EndpointError`] when a name is malformed or the middleware refuses.
@@ -164,12 +164,12 @@ impl Consumers {
             Ok(sample) => {
                 self.attitudes.push(sample);
                 if let Some(count) = self.bad_attitude.good() {
-                    log::info!("the receiver's attitude is usable again after {count} samples");
+                    log::info!("the receiver's attitude is usable again after {count} bad samples");
                 }
             }
             Err(error) => {
                 if self.bad_attitude.fault((), Instant::now()) {
-                    log::warn!("a sample of the receiver's attitude is not used: {error}");
+                    log::warn!("ignoring a sample of the receiver's attitude: {error}");
                 }
                 self.last_bad_attitude = Some(error.to_string());
             }

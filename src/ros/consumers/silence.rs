@@ -1,10 +1,10 @@
-//! Why an output says nothing.
+//! Why an output is held back.
 
 use crate::frames::AttitudeError;
 use crate::ros::convert::FlightStackError;
 use crate::ros::health::Unexpected;
 
-/// Why an output said nothing to a frame.
+/// Why an output is held back for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(super) enum Silence {
     #[error(transparent)]
@@ -12,10 +12,10 @@ pub(super) enum Silence {
     #[error(transparent)]
     FlightStack(#[from] FlightStackError),
     #[error(
-        "the track is not confirmed yet, or this frame did not fit it: it needs a few consistent frames"
+        "the track is not confirmed yet, or this frame contradicted it: it needs a few consistent frames"
     )]
     NoTrack,
-    #[error("the covariance of the position gives no probability")]
+    #[error("no probability follows from the covariance of the position")]
     NoProbability,
     #[error("{0}: see unexpected_attitude")]
     UnexpectedAttitude(Unexpected),

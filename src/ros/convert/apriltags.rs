@@ -20,7 +20,7 @@ pub struct TagDetections {
 
 /// Returns the points of a message, all without a sigma of their own.
 ///
-/// The centre of a tag whose corners count is not used: it is where their diagonals meet, so it adds nothing.
+/// The centre of a tag with known corners is not used: it is the intersection of their diagonals, so it adds nothing.
 ///
 /// # Errors
 /// [`Refusal`] for a tag that the map does not hold, or not in this family. Pixels are not checked here.

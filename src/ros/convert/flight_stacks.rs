@@ -33,13 +33,13 @@ pub enum FlightStackError {
         /// m.
         position_m: [f64; 3],
     },
-    /// An orientation that is none.
+    /// A quaternion that is not of length 1.
     #[error("expected a quaternion of length 1, got one of length {norm}")]
     Orientation {
         /// Its length.
         norm: f64,
     },
-    /// A rate that is none.
+    /// A rate that is not finite.
     #[error("expected finite rates, got {rate_radps:?} rad/s")]
     Rate {
         /// rad/s.
@@ -53,7 +53,7 @@ pub enum FlightStackError {
 /// Returns PX4's landing target of the track: receptacle against receiver, NED.
 ///
 /// The target moves, so it is never static and its velocity never the vehicle's own. There is no absolute position;
-/// `abs_pos_valid` says so, which not every reader in PX4 looks at.
+/// `abs_pos_valid` is false, which not every reader in PX4 checks.
 ///
 /// # Errors
 /// [`FlightStackError`]: what PX4 would reject is not sent.
@@ -126,8 +126,7 @@ pub fn px4_fiducial_marker(
 
 /// Returns MAVROS's landing target of one frame, such that `MAVLink`'s `LANDING_TARGET` has it in `BODY_FRD`.
 ///
-/// MAVROS turns the pose from ENU to NED whatever `frame` says, so FRD is written down as though it were
-/// NED told in ENU.
+/// MAVROS converts the pose from ENU to NED regardless of `frame`, so FRD is encoded as if it were NED in ENU.
 ///
 /// # Errors
 /// [`FlightStackError::Position`]: `ArduPilot` drops a target at no distance.
@@ -207,7 +206,7 @@ pub fn px4_attitude(
 /// # Errors
 /// [`FlightStackError::NoOrientation`], [`FlightStackError::Orientation`], [`FlightStackError::Rate`].
 pub fn imu_attitude(message: &Imu) -> Result<AttitudeSample, FlightStackError> {
-    // sensor_msgs/Imu: −1 says that there is none. NaN says nothing about it.
+    // sensor_msgs/Imu: −1 marks it as missing. NaN does not.
     if message.orientation_covariance[0] < 0.0 {
         return Err(FlightStackError::NoOrientation);
     }

@@ -3,7 +3,7 @@
 use crate::refuelling::{Assessment, EnvelopeState, ReceptacleEstimate};
 use crate::ros::messages::{Header, ReceptacleState, Vector3};
 
-/// Returns the message of a receptacle and what the envelope says of it.
+/// Returns the message of a receptacle and its envelope.
 #[must_use]
 pub fn receptacle(
     header: Header,

@@ -1,4 +1,4 @@
-//! The other way round: what tools around the node send to it, and hear from it.
+//! The inverse: messages that tools send to the node and receive from it.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 

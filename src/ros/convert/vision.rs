@@ -7,7 +7,7 @@ use crate::text::clip;
 /// Returns the detections of a message, all without a sigma of their own.
 ///
 /// # Errors
-/// [`Refusal`] for the first detection whose marker id cannot be told, or whose own header is that of
+/// [`Refusal`] for the first detection without a clear marker id, or whose own header is that of
 /// another image. Pixels are not checked here.
 pub fn vision_detections(message: &Detection2DArray) -> Result<Vec<Detection>, Refusal> {
     let detection = |found: &Detection2D| {

@@ -11,9 +11,9 @@ use crate::refuelling::ExpectedAttitude;
 const LASTING: Duration = Duration::from_secs(3);
 /// How many of them at least, and of good ones for the end.
 const MANY: u32 = 10;
-/// Of the limit: below it a pose is clearly good. A tanker that nods past the limit and back says nothing new.
+/// Of the limit: below it a pose is clearly good. A brief excursion past the limit and back changes nothing.
 const CLEARLY_GOOD: f64 = 0.5;
-/// How long all poses must be clearly good before a fault that nobody mended is over.
+/// How long all poses must be clearly good before a fault ends without a change of parameters.
 const GOOD_AGAIN: Duration = Duration::from_secs(10);
 /// s; over this time poses are averaged: one far away may be off by many degrees, and so may its neighbour by others.
 const SMOOTHED_S: f64 = 1.0;
@@ -38,7 +38,7 @@ impl fmt::Display for Unexpected {
         } else {
             write!(
                 f,
-                "the tanker stood more than {limit_deg}° off its nominal attitude for long, and though it is {off_deg:.1}° \
+                "the tanker stood more than {limit_deg}° off its nominal attitude for a while, and although it is {off_deg:.1}° \
                  off now, {}",
                 not_over(*limit_deg)
             )
@@ -97,7 +97,7 @@ impl Attitude {
         }
     }
 
-    /// Takes what is expected from now on; begins anew if that differs. Returns whether it does.
+    /// Takes what is expected from now on; restarts if that differs. Returns whether it does.
     pub fn expect(&mut self, expected: &ExpectedAttitude) -> bool {
         let differs = self.expected != *expected;
         if differs {
@@ -122,7 +122,7 @@ impl Attitude {
                 let step = (before.inverse() * turn).scaled_axis();
                 before * UnitQuaternion::from_scaled_axis(step * share)
             }
-            // Nothing, or too long ago to say anything about now.
+            // Nothing, or stale.
             _ => {
                 self.off = Off::default();
                 self.good = None;
@@ -163,7 +163,7 @@ impl Attitude {
         }
     }
 
-    /// Returns how the tanker is off, if it is, or was for long and is not clearly good yet: what is told of the
+    /// Returns how the tanker is off, if it is, or was for long and is not clearly good yet: what is published of the
     /// receptacle is then most likely wrong.
     #[must_use]
     pub fn unexpected(&self) -> Option<Unexpected> {

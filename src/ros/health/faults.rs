@@ -3,40 +3,40 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// What can be wrong around the node.
+/// Problems around the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fault {
-    /// A publisher or subscriber asks for another quality of service than there is.
+    /// A publisher or subscriber with incompatible quality of service.
     IncompatibleQos,
-    /// A publisher or subscriber means another message type.
+    /// A publisher or subscriber has another message type.
     WrongType,
-    /// A publisher is there, and nothing comes.
+    /// There is a publisher, but no message arrives.
     SilentPublisher,
-    /// The camera is there, or detections were, and none come.
+    /// There is a camera, or there were detections, but none arrive now.
     NoDetections,
-    /// Detections come, and no camera info ever has.
+    /// Detections arrive, but camera info never has.
     NoCameraInfo,
-    /// Detections come, and the camera info that came steadily no longer does.
+    /// Detections arrive, but the steady camera info has stopped.
     StaleCameraInfo,
     /// Detections and camera info name different frames.
     FrameMismatch,
-    /// A marker is left out of frame after frame.
+    /// A marker is left out of too many frames.
     SuspectMarker,
-    /// Frame after frame is not trusted, or leaves a marker out.
+    /// Too many frames are not trusted or leave a marker out.
     NotTrusted,
-    /// Residuals are larger or smaller than the sigmas say.
+    /// Residuals are larger or smaller than the sigmas predict.
     Sigma,
     /// The tanker stands off its nominal attitude.
     UnexpectedAttitude,
     /// Images are from the future, or from long ago.
     ClockOffset,
-    /// Stamps of detections go back, or far ahead.
+    /// Stamps of detections jump back, or far ahead.
     StampJump,
-    /// The simulated time goes back, or far ahead, or the system's back.
+    /// Simulated time jumps back or far ahead, or the system clock is set back.
     ClockJump,
-    /// Simulated time is wanted, and none comes.
+    /// Simulated time is enabled, but no `/clock` arrives.
     NoClock,
-    /// Samples came that do not decode.
+    /// Samples that cannot be decoded.
     Undecodable,
     /// More samples waited than the topic's depth.
     LostInput,
@@ -119,7 +119,7 @@ impl Fault {
 #[derive(Debug)]
 struct Open {
     latest: String,
-    /// Bytes of them that still hold when it is over: what follows is said only while it lasts.
+    /// Length of the part that is repeated when the fault ends; the rest applies only while it lasts.
     lasting: usize,
     since: Instant,
     seen: Instant,
@@ -127,7 +127,7 @@ struct Open {
 }
 
 impl Open {
-    /// Returns the line for its end: how long it lasted, by when it was seen last, in its last words.
+    /// Returns the log line for its end: duration until it was last seen, and its last message.
     fn epitaph(&self, fault: Fault, now: Instant) -> String {
         let (name, latest) = (fault.name(), &self.latest[..self.lasting]);
         let seconds = self
@@ -144,24 +144,24 @@ impl Open {
     }
 }
 
-/// The faults that last now.
+/// The active faults.
 #[derive(Debug, Default)]
 pub struct Faults {
     open: BTreeMap<(Fault, String), Open>,
 }
 
 impl Faults {
-    /// Takes note of a fault of which there is one at a time, in these words.
+    /// Records a fault of which there is one at a time, with its message.
     pub fn see(&mut self, fault: Fault, words: &str, now: Instant) {
         self.see_of(fault, "", words, now);
     }
 
-    /// Takes note of a fault of something of which there are many.
+    /// Records a fault of something of which there are many.
     pub fn see_of(&mut self, fault: Fault, of: &str, words: &str, now: Instant) {
         self.see_while(fault, of, words, "", now);
     }
 
-    /// Takes note of a fault with what it does while it lasts, which the line for its end leaves out.
+    /// Records a fault with its consequence while it lasts, which the log line for its end omits.
     pub fn see_while(&mut self, fault: Fault, of: &str, words: &str, doing: &str, now: Instant) {
         let key = (fault, of.to_owned());
         let lasting = words.len();
@@ -184,16 +184,16 @@ impl Faults {
         self.open.insert(key, open);
     }
 
-    /// Takes note that a fault seems to be over.
+    /// Records that a fault seems to be over.
     pub fn end(&mut self, fault: Fault) {
         for ((_, _), open) in self.open.iter_mut().filter(|((kind, _), _)| *kind == fault) {
             open.over = true;
         }
     }
 
-    /// Takes note that a fault of something of which there are many seems to be over.
+    /// Records that a fault of something of which there are many seems to be over.
     pub fn end_of(&mut self, fault: Fault, of: &str) {
-        // Asked for every sample, and nearly always for nothing.
+        // Called for every sample, nearly always without an effect.
         if self.open.is_empty() {
             return;
         }
@@ -214,7 +214,7 @@ impl Faults {
         });
     }
 
-    /// Returns the words of all that last now, in the order of [`Fault::ALL`].
+    /// Returns the messages of all active faults, in the order of [`Fault::ALL`].
     pub fn iter(&self) -> impl Iterator<Item = (Fault, &str)> {
         self.open
             .iter()

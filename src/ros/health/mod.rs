@@ -1,6 +1,6 @@
 //! Detects what is wrong around the node, logs when it begins and ends, and shows it in `/diagnostics` in between.
 //!
-//! `watch` notices, `faults` remembers and says. `stamp_age` judges stamps, `residuals` frames that do not agree, and
+//! `watch` detects faults, `faults` keeps and logs them. `stamp_age` checks stamps, `residuals` frames that disagree and
 //! sigmas, `attitude` mount and nominal attitude; `latency` keeps quantiles. Time is an argument, so that tests need no
 //! clock.
 

@@ -1,4 +1,4 @@
-//! Refusals that are no frame's fault, but that of the surroundings.
+//! Refusals caused by the surroundings rather than by the frame.
 
 use super::Fault;
 use crate::pipeline::Refusal;

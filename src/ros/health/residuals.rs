@@ -1,5 +1,5 @@
-//! Frames that are not trusted or leave a marker out, again and again: no wrong detection, but a map, a calibration or
-//! sigmas that are wrong.
+//! Repeated frames that are not trusted or leave a marker out: the cause is the map, the calibration or the sigmas
+//! rather than a wrong detection.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -8,17 +8,17 @@ use nalgebra::Vector2;
 
 use crate::pipeline::{MarkerResidual, SigmaFactor};
 
-/// s; what is older than this counts for little.
+/// s; time constant of the sums.
 const MEMORY_S: f64 = 3.0;
-/// How long so many must not agree.
+/// How long so many frames must disagree.
 const LASTING: Duration = Duration::from_secs(3);
 /// How many of them at least.
 const MANY: u32 = 10;
-/// Of the frames with a fit: more are no accident. Of correct ones one in a thousand does not agree.
+/// Share of the frames with a fit above which there is a fault. Of correct frames one in a thousand disagrees.
 const MANY_OF_ALL: f64 = 0.3;
-/// Fewer, and it is over.
+/// Share below which it is over.
 const FEW_OF_ALL: f64 = 0.1;
-/// Of the squared residuals: what points the same way in frame after frame is no noise.
+/// Share of the squared residuals: a constant part is not noise.
 const SYSTEMATIC: f64 = 0.3;
 /// Sigmas that are wrong by a larger factor are a fault.
 const WRONG_BY: f64 = 1.3;
@@ -43,7 +43,7 @@ pub struct Residuals {
     lasts: bool,
 }
 
-/// A time in which many do not agree.
+/// A period in which many frames disagree.
 #[derive(Debug)]
 struct Run {
     since: Instant,
@@ -91,14 +91,14 @@ impl Residuals {
         let percent = 100.0 * self.disagreeing / self.fits;
         let factor = sigmas.map_or(1.0, |sigmas| sigmas.factor);
         let cause = if self.is_systematic() {
-            format!("wrong detections do not last like that; {SAME_WAY}")
+            format!("wrong detections would not persist like this; {SAME_WAY}")
         } else if factor > WRONG_BY {
             format!(
-                "wrong detections do not last like that; the residuals scatter about zero: the sigmas (pixel_sigma_px, or those \
-                 of the detections) are too small, {factor:.1} times as large would fit"
+                "wrong detections would not persist like this; the residuals scatter about zero: the sigmas (pixel_sigma_px, or those \
+                 of the detections) are too small, by a factor of {factor:.1}"
             )
         } else {
-            "most frames fit their sigmas, and the residuals of the others scatter: so many wrong detections are the detector's"
+            "most frames fit their sigmas, and the residuals of the others scatter: the detector gives that many wrong detections"
                 .to_owned()
         };
         Some(format!(
@@ -131,11 +131,11 @@ impl Residuals {
                 "they scatter about zero"
             };
             Some(format!(
-                "{which} are too small: over {span_s:.0} s residuals were {factor:.1} times as large as they say, and {cause}. {now}"
+                "{which} are too small: over {span_s:.0} s residuals were {factor:.1} times as large as they state, and {cause}. {now}"
             ))
         } else if factor < 1.0 / WRONG_BY {
             Some(format!(
-                "{which} are too large: over {span_s:.0} s residuals were {factor:.2} times as large as they say. Covariances are \
+                "{which} are too large: over {span_s:.0} s residuals were {factor:.2} times as large as they state. Covariances are \
                  too large, and wrong detections up to that size pass"
             ))
         } else {
@@ -161,8 +161,8 @@ impl Residuals {
             format!("; next is marker {id} with {:.1} sigma", in_sigmas(sums))
         });
         format!(
-            ". Worst is marker {id}: {:.2} px or {:.1} sigma per axis, on average detected ({:+.2}, {:+.2}) px from where \
-             the fit has it{next}",
+            ". Worst is marker {id}: {:.2} px or {:.1} sigma per axis, on average detected ({:+.2}, {:+.2}) px from its \
+             fitted position{next}",
             rms(worst.squared_px2, worst),
             in_sigmas(worst),
             -mean.x,
@@ -198,7 +198,7 @@ impl Residuals {
 }
 
 /// What residuals show that do not scatter.
-const SAME_WAY: &str = "the residuals point the same way in frame after frame: the marker map or the calibration \
+const SAME_WAY: &str = "the residuals point the same way in every frame: the marker map or the calibration \
                         (camera_info) is wrong";
 
 #[cfg(test)]
@@ -290,7 +290,7 @@ mod tests {
             "{words}"
         );
         let words = residuals.in_words(Some(by(1.05))).expect("as before");
-        assert!(words.contains("are the detector's"), "{words}");
+        assert!(words.contains("the detector gives that many"), "{words}");
     }
 
     #[test]

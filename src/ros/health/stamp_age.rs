@@ -28,7 +28,7 @@ pub struct StampAge {
     run: Option<Run>,
 }
 
-/// Images in a row that are off to the same side.
+/// Consecutive images that are off to the same side.
 #[derive(Debug)]
 struct Run {
     side: Side,
@@ -92,16 +92,16 @@ fn in_words(side: Side, image: ImageAge) -> String {
         ),
         Side::Future => format!("are {by_s:.1} s in the future {clock}: {UNSYNCHRONISED}"),
         Side::Past if image.stamp_s < FIRST_SET_S => format!(
-            "say {} s since 1970: they count from a start (of a machine, or a simulation without use_sim_time here), \
-             not by a clock that is set",
+            "are {} s since 1970: they are counted from a start-up (of a machine, or a simulation without use_sim_time here), \
+             not taken from a clock that is set",
             image.stamp_s
         ),
         Side::Past if image.is_simulated => format!(
-            "are {by_s:.1} s old {clock}: they belong to another recording, or the detector is that far behind"
+            "are {by_s:.1} s old {clock}: they belong to another recording, or the detector lags that far behind"
         ),
         Side::Past => format!(
             "are {by_s:.1} s old {clock}: {UNSYNCHRONISED}, a recording is played without use_sim_time, or the detector \
-             is that far behind"
+             lags that far behind"
         ),
     }
 }
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    /// What is said of images that come for some seconds.
+    /// The message about images over some seconds.
     fn said(images: impl Fn(u32) -> ImageAge, frames: u32) -> Option<String> {
         let (mut ages, start) = (StampAge::default(), Instant::now());
         (0..frames)

@@ -1,4 +1,4 @@
-//! Notices what is wrong around the node, from what arrives, what is refused and what the graph holds.
+//! Detects faults around the node, from arrivals, refusals and the graph.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -16,15 +16,15 @@ use crate::ros::messages::Time;
 
 /// Longer than a reliable publisher on Fast DDS may take for its first sample: 3 s, its heartbeat's period.
 const SILENCE: Duration = Duration::from_secs(5);
-/// A camera info counts as steady after so many seconds with one in each; one that is latched never is.
+/// Camera info counts as steady after this many consecutive seconds with one in each; a latched one never does.
 const STEADY_S: u32 = 3;
-/// How long detections may come before the camera info does, at a start.
+/// How long detections may arrive before the first camera info.
 const GRACE: Duration = Duration::from_secs(2);
 /// Missing detections are logged after this long.
 const WAIT: Duration = Duration::from_secs(3);
-/// How often the residuals of the last seconds are looked at.
+/// How often the residuals of the last seconds are evaluated.
 const BETWEEN_SIGMAS: Duration = Duration::from_millis(200);
-/// Most ends of others that are named; a strange graph may have any number.
+/// Limit of endpoints that are named; a foreign graph may have any number.
 const MOST_MISFITS: usize = 16;
 
 /// What arrives on a topic.
@@ -34,7 +34,7 @@ struct Arrivals {
     this_second: bool,
     steady_s: u32,
     was_steady: bool,
-    /// Since when the topic has had a publisher that fits.
+    /// Since when the topic has had a matching publisher.
     heard_since: Option<Instant>,
 }
 
@@ -46,7 +46,7 @@ impl Arrivals {
 
     fn on_second(&mut self, publishers: usize, now: Instant) {
         if publishers > 0 && self.heard_since.is_none() {
-            // Begun anew, and perhaps as one that is sent only once.
+            // A restarted publisher may send camera info only once.
             self.steady_s = 0;
             self.was_steady = false;
         }
@@ -68,12 +68,12 @@ impl Arrivals {
         self.last.is_some()
     }
 
-    /// Whether the last one came a short while ago.
+    /// Whether the last one arrived recently.
     fn recent(&self, now: Instant) -> bool {
         self.last.is_some_and(|last| !is_long(last, now))
     }
 
-    /// Whether the topic has had a publisher for a while, and nothing comes.
+    /// Whether the topic has had a publisher for a while, but no message arrives.
     fn silent(&self, now: Instant) -> bool {
         self.heard_since.is_some_and(|since| is_long(since, now)) && !self.recent(now)
     }
@@ -83,15 +83,15 @@ fn is_long(since: Instant, now: Instant) -> bool {
     now.saturating_duration_since(since) >= SILENCE
 }
 
-/// What a second brings beside the messages.
+/// State of graph and clocks, once a second.
 pub struct Second<'a> {
     /// The other ends of the node's topics.
     pub graph: &'a Graph,
     /// How `/clock` jumped, if it did.
     pub clock_jump: Option<String>,
-    /// What is to be said of the system's clock.
+    /// Message about the system clock, if there is one.
     pub system_clock: Option<String>,
-    /// Since when no simulated time has come, if it is wanted.
+    /// Since when no simulated time has arrived, if it is enabled.
     pub clock_silence: Option<ClockSilence>,
     /// Topics on which something was dropped, and why.
     pub dropped: Vec<(String, String)>,
@@ -100,7 +100,7 @@ pub struct Second<'a> {
 /// Notices faults.
 #[derive(Debug)]
 pub struct Watch {
-    /// Those that last.
+    /// The active faults.
     pub faults: Faults,
     /// From a message to the last thing published for it.
     pub latency: Latency,
@@ -117,19 +117,19 @@ pub struct Watch {
     residuals: Residuals,
     sigmas_seen: Option<Instant>,
     stamp_age: StampAge,
-    /// Judges where the tanker stands; `None` while nothing depends on that.
+    /// Checks the tanker's attitude; `None` while nothing depends on it.
     attitude: Option<Attitude>,
-    /// Whether outputs stop while it stands where it should not.
+    /// Whether outputs are held back while that is unexpected.
     holds_outputs: bool,
     waiting_said: bool,
     without_camera: Option<WithoutCamera>,
 }
 
-/// Refusals for want of a camera info.
+/// Refusals for lack of a camera info.
 #[derive(Debug)]
 struct WithoutCamera {
     since: Instant,
-    /// The latest one that was not passed on.
+    /// The latest one that was not reported.
     latest: Option<String>,
 }
 
@@ -158,24 +158,24 @@ impl Watch {
         }
     }
 
-    /// Takes note that detections came, of whatever kind.
+    /// Records the arrival of detections of any type.
     pub fn on_detections(&mut self, now: Instant) {
         self.detections.take(now);
     }
 
-    /// Takes note that a camera info came.
+    /// Records the arrival of a camera info.
     pub fn on_camera_info(&mut self, now: Instant) {
         self.camera.take(now);
         self.without_camera = None;
         self.faults.end(Fault::NoCameraInfo);
     }
 
-    /// Takes note of a sample of `topic` that could be decoded.
+    /// Records a sample of `topic` that could be decoded.
     pub fn on_decoded(&mut self, topic: &str) {
         self.faults.end_of(Fault::Undecodable, topic);
     }
 
-    /// Takes note of a sample of `topic` that could not.
+    /// Records a sample of `topic` that could not.
     pub fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display, now: Instant) {
         let words = format!(
             "a message on {topic} cannot be decoded, its publisher may be built with another definition of the type: {error}"
@@ -183,12 +183,12 @@ impl Watch {
         self.faults.see_of(Fault::Undecodable, topic, &words, now);
     }
 
-    /// Takes note of samples of `topic` that were passed over.
+    /// Records samples of `topic` that were skipped.
     pub fn on_lost(&mut self, topic: &str, count: u64, now: Instant) {
         if count > 0 {
             let words = format!(
-                "{count} message(s) on {topic} were skipped within a second for newer ones: the node was held up, or they come \
-                 faster than it can answer"
+                "{count} message(s) on {topic} were skipped within a second in favour of newer ones: the node was blocked, or they \
+                 arrive faster than it can answer"
             );
             self.faults.see_of(Fault::LostInput, topic, &words, now);
         }
@@ -208,14 +208,14 @@ impl Watch {
         }
     }
 
-    /// Forgets the poses before, as the node does.
+    /// Discards earlier poses, as the node does.
     pub fn on_reset(&mut self) {
         if let Some(attitude) = &mut self.attitude {
             attitude.begin_anew();
         }
     }
 
-    /// Takes note of where a trusted pose has the tanker; returns how that is off what is expected, if it is.
+    /// Records the attitude of a trusted pose; returns its deviation if it is unexpected.
     pub fn on_attitude(
         &mut self,
         camera_from_tanker: &UnitQuaternion<f64>,
@@ -226,7 +226,7 @@ impl Watch {
         attitude.unexpected()
     }
 
-    /// Takes note of the fit of a frame, if it has one: its residuals, and markers that are left out too often.
+    /// Records the fit of a frame, if it has one: its residuals, and markers that are left out too often.
     pub fn on_outcome(&mut self, outcome: &FrameOutcome, pipeline: &Pipeline, now: Instant) {
         let Some(solution) = outcome.solution() else {
             return;
@@ -245,7 +245,7 @@ impl Watch {
         }
     }
 
-    /// Whether the residuals of the last seconds are to be looked at again: a median of many numbers.
+    /// Whether it is time to evaluate the residuals again, which takes a median of many numbers.
     fn is_time_for_sigmas(&mut self, now: Instant) -> bool {
         let is_time = self
             .sigmas_seen
@@ -272,7 +272,7 @@ impl Watch {
         }
     }
 
-    /// Takes note of the age of an image from the camera's frame.
+    /// Records the age of an image from the camera's frame.
     pub fn on_age(&mut self, image: ImageAge, now: Instant) {
         match self.stamp_age.take(image, now) {
             Some(Some(words)) => {
@@ -284,19 +284,19 @@ impl Watch {
         }
     }
 
-    /// Takes note of an image from the camera's frame.
+    /// Records an image from the camera's frame.
     pub fn on_image(&mut self, stamp: Time, now: Instant) {
         self.faults.end(Fault::FrameMismatch);
         if let Some(jump) = self.stamps.take(stamp, now) {
             let topic = &self.detections_topic;
             let words = format!(
-                "stamps of {topic} went {jump}: two sources in turn, a clock that was set, or a recording that begins anew"
+                "stamps of {topic} jumped {jump}: two sources alternate, a clock was set, or a recording was restarted"
             );
             self.faults.see(Fault::StampJump, &words, now);
         }
     }
 
-    /// Takes note of a refusal for a fault of the surroundings.
+    /// Records a refusal that reveals a fault around the node.
     pub fn on_refusal(&mut self, fault: Fault, words: &str, now: Instant) {
         if fault == Fault::NoCameraInfo {
             let without = self.without_camera.get_or_insert(WithoutCamera {
@@ -319,8 +319,8 @@ impl Watch {
         let (camera, detections) = (&self.camera_topic, &self.detections_topic);
         let publishers = self.cameras;
         format!(
-            "detections come on {detections}, but no camera info has come on {camera}, which has {publishers} publisher(s) of the \
-             right type and QoS: {refusal}"
+            "detections arrive on {detections}, but no camera info has arrived on {camera}, which has {publishers} publisher(s) of \
+             matching type and QoS: {refusal}"
         )
     }
 
@@ -364,7 +364,7 @@ impl Watch {
         let silence_s = SILENCE.as_secs();
         let silent = |topic: &str, publishers: usize| {
             format!(
-                "nothing has come on {topic} for {silence_s} s, though it has {publishers} publisher(s) of the right type and QoS"
+                "no message on {topic} for {silence_s} s, although it has {publishers} publisher(s) of matching type and QoS"
             )
         };
         if self.detections.silent(now) {
@@ -384,10 +384,10 @@ impl Watch {
             let ever = self.detections.ever();
             if ever || (self.camera.recent(now) && is_long(self.begin, now)) {
                 let words = if ever {
-                    format!("nothing comes on {detections} any more: its publisher has left")
+                    format!("no more detections on {detections}: its publisher has left")
                 } else {
                     format!(
-                        "camera info comes on {camera}, but {detections} has no publisher of the right type and QoS"
+                        "camera info arrives on {camera}, but {detections} has no publisher of matching type and QoS"
                     )
                 };
                 self.faults.see(Fault::NoDetections, &words, now);
@@ -395,14 +395,14 @@ impl Watch {
         }
         if self.camera.was_steady && !self.camera.recent(now) && self.detections.recent(now) {
             let words = format!(
-                "no camera info on {camera} for {silence_s} s, where it came steadily before ({cameras} publisher(s) now), while \
-                 detections go on: the last one is still used"
+                "no camera info on {camera} for {silence_s} s, after a steady stream ({cameras} publisher(s) now), while detections \
+                 continue: the last one is still used"
             );
             self.faults.see(Fault::StaleCameraInfo, &words, now);
         }
         if self.detections.ever() {
             if std::mem::take(&mut self.waiting_said) {
-                log::info!("detections have begun to come on {detections}");
+                log::info!("detections now arrive on {detections}");
             }
         } else if detectors == 0
             && !self.waiting_said
@@ -431,15 +431,15 @@ impl Watch {
     fn watch_clock(&mut self, jump: Option<String>, silence: Option<ClockSilence>, now: Instant) {
         if let Some(jump) = jump {
             let words = format!(
-                "/clock went {jump}: a simulation or recording that begins anew or leaps, or two of them at once"
+                "/clock jumped {jump}: a simulation or recording was restarted or skipped ahead, or two run at once"
             );
             self.faults.see(Fault::ClockJump, &words, now);
         }
         if let Some(silence) = silence.filter(|silence| is_long(silence.since, now)) {
             let words = if silence.ever {
-                "use_sim_time is set, but /clock has stopped: the node's time stands still"
+                "use_sim_time is set, but /clock has stopped: the node's time does not advance"
             } else {
-                "use_sim_time is set, but no /clock has come: the node's time is zero"
+                "use_sim_time is set, but no /clock message has arrived: the node's time is zero"
             };
             self.faults.see(Fault::NoClock, words, now);
         }

@@ -1,4 +1,4 @@
-//! Messages of the ROS packages that everybody has.
+//! Messages of the ROS packages that every installation has.
 
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;

@@ -76,7 +76,7 @@ impl Lifecycle {
                 after.label()
             );
         }
-        // Nobody waits for it once the services are closed.
+        // Without a receiver once the services are closed.
         let _ = request.answer.try_send(success);
     }
 
@@ -108,7 +108,7 @@ impl Lifecycle {
             ..services::event(transition)
         };
         if let Err(error) = self.events.publish(event) {
-            log::warn!("a change of state is not published on ~/transition_event: {error}");
+            log::warn!("cannot publish a transition on ~/transition_event: {error}");
         }
     }
 

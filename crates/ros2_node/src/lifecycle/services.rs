@@ -57,7 +57,7 @@ pub(super) fn open(
     Ok(smol::spawn(join_all(services).map(drop)))
 }
 
-/// Asks the node for a transition, and returns what came of it.
+/// Requests a transition from the node, and returns its result.
 async fn ask(
     requests: smol::channel::Sender<Request>,
     transition: LifecycleTransition,

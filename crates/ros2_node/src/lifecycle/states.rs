@@ -101,14 +101,14 @@ impl State {
     }
 }
 
-/// What came of the work of a transition.
+/// The result of the work of a transition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkResult {
-    /// It is done.
+    /// It succeeded.
     Success,
-    /// It is not done, and all is as before.
+    /// It failed and changed nothing.
     Failure,
-    /// It is not done, and what there is has to be cleared.
+    /// It failed part way; error processing follows.
     Error,
 }
 

@@ -120,7 +120,7 @@ impl Events {
                 ..ParameterEvent::default()
             };
             if let Err(error) = self.publisher.publish(event) {
-                log::warn!("a change of parameters is not published on /parameter_events: {error}");
+                log::warn!("cannot publish a change of parameters on /parameter_events: {error}");
             }
         }
         SetParametersResult {

@@ -35,7 +35,7 @@ impl SharedParameters {
         qos: &QosOverrides,
         check: impl Fn(&Parameters) -> Result<(), String> + Send + Sync + 'static,
     ) -> (Self, smol::channel::Receiver<()>) {
-        // One place is enough: who reads the channel then reads all the parameters.
+        // One place is enough: the reader of the channel then reads all parameters.
         let (changed, changes) = smol::channel::bounded(1);
         let qos = qos
             .iter()

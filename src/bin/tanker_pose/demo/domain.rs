@@ -11,7 +11,7 @@ const FIRST: u16 = 50;
 const COUNT: u16 = 50;
 
 /// Returns the environment of both nodes: loopback only, in the chosen domain, or in that of
-/// `ROS_DOMAIN_ID`, or in one that nobody on this host is in.
+/// `ROS_DOMAIN_ID`, or in one that is free on this host.
 pub fn environment(domain_id: Option<u16>) -> Result<Environment, DemoError> {
     let asked = Environment::from_process()?;
     let is_set = std::env::var_os("ROS_DOMAIN_ID").is_some_and(|value| !value.is_empty());

@@ -37,9 +37,9 @@ pub enum DemoError {
     Signals(std::io::Error),
     #[error("cannot start the node's thread: {0}")]
     Thread(std::io::Error),
-    #[error("the node ended: {0}")]
+    #[error("the node exited: {0}")]
     Node(Box<NodeError>),
-    #[error("the node's thread ended by itself")]
+    #[error("the node's thread ended unexpectedly")]
     NodeGone,
     #[error(transparent)]
     Open(#[from] OpenError),

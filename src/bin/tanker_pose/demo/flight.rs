@@ -14,7 +14,7 @@ use super::plan::Plan;
 use crate::simulate::source::{Source, SourceError};
 use crate::simulate::{ApproachOptions, Pace};
 
-/// Frames a second while nobody answers yet.
+/// Frames a second until the first answer.
 const PROBE_HZ: f64 = 20.0;
 /// For the last answers; they take about a millisecond.
 const LAST_ANSWERS: Duration = Duration::from_secs(2);
@@ -87,7 +87,7 @@ impl Flight {
         }
     }
 
-    /// Returns the frames, with what came back for them.
+    /// Returns the frames, with their answers.
     pub const fn ledger(&self) -> &Ledger {
         &self.ledger
     }
@@ -218,7 +218,7 @@ impl Flight {
 
     fn no_answer(&self) -> DemoError {
         let reason = match (&self.probes.refusal, self.probes.pose, self.probes.status) {
-            (_, Some(_), _) => "poses come, but no status that goes with one".to_owned(),
+            (_, Some(_), _) => "poses arrive, but no status that belongs to one".to_owned(),
             (_, None, Some(_)) => "the node answers, but its poses do not arrive".to_owned(),
             (Some(refusal), None, None) => format!("the node refuses every frame: {refusal}"),
             (None, None, None) => "no frame is answered".to_owned(),

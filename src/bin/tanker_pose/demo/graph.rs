@@ -97,7 +97,7 @@ impl Graph {
         }
     }
 
-    /// Waits until the graph shows this node's topics matched, and nobody else on them.
+    /// Waits until the graph shows this node's topics matched, without other endpoints on them.
     async fn connect(&self, patience: Duration) -> Result<(), DemoError> {
         let node = self.ros.node();
         let lacking = |what: &str| DemoError::Discovery {
@@ -106,14 +106,14 @@ impl Graph {
         };
         within(patience, self.source.wait_for_subscribers(&self.ros))
             .await
-            .ok_or_else(|| lacking("nobody listens to feature_points and camera_info"))?;
+            .ok_or_else(|| lacking("no subscriber of feature_points and camera_info"))?;
         let answers = async {
             self.pose.wait_for_publisher(node).await;
             self.status.wait_for_publisher(node).await;
         };
         within(patience, answers)
             .await
-            .ok_or_else(|| lacking("nobody publishes pose and status"))?;
+            .ok_or_else(|| lacking("no publisher of pose and status"))?;
         check_alone(&self.ros, self.domain_id)
     }
 

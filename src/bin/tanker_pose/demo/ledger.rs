@@ -1,4 +1,4 @@
-//! Every frame that was sent, and what came back for it.
+//! Every frame that was sent, and its answers.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -39,7 +39,7 @@ pub struct Estimate {
     pub covariance: PoseCovariance,
     /// Truth less estimate: m, rad.
     pub error: Vector6<f64>,
-    /// The error's squared length in sigmas; infinite where the covariance is none.
+    /// The error's squared length in sigmas; infinite where the covariance is not positive definite.
     pub nees: f64,
     /// From publishing the detections to receiving the pose.
     pub latency: Duration,

@@ -75,7 +75,7 @@ impl Live {
         self.say(HEADER);
     }
 
-    /// Takes note of a frame that was sent.
+    /// Records a frame that was sent.
     pub fn sent(&self, frame: &Frame) {
         self.bar
             .set_message(format!("{:.1} m ahead", frame.ahead_m()));
@@ -84,7 +84,7 @@ impl Live {
     /// Says that the schedule was moved.
     pub fn held_up(&self, late: Duration) {
         let late_s = late.as_secs_f64();
-        self.say(&format!("held up for {late_s:.1} s: going on from here"));
+        self.say(&format!("delayed by {late_s:.1} s: continuing from here"));
     }
 
     /// Says which fault comes now.
@@ -97,7 +97,7 @@ impl Live {
         ));
     }
 
-    /// Takes note of a frame that was answered.
+    /// Records a frame that was answered.
     pub fn answered(&mut self, frame: &Frame, plan: &Plan, ledger: &Ledger) {
         self.bar.inc(1);
         let code = frame.verdict.as_ref().map(|verdict| verdict.code);

@@ -130,8 +130,7 @@ fn report(ledger: &Ledger, end: End, is_one_draw: bool, json: bool) -> Result<()
     }
 }
 
-/// What the node is told: as on its own command line, the defaults but for the marker map, and what the camera of a drawn
-/// world may have wrong.
+/// The node's arguments: its defaults, except for the marker map and the errors of a drawn camera.
 fn node_arguments(approach: &ApproachOptions) -> Result<RosArguments, ArgumentError> {
     let mut words = vec!["--ros-args".to_owned(), "-p".to_owned()];
     // Quoted, so that a path that looks like a number stays text.

@@ -230,7 +230,7 @@ impl Display for Summary {
         let injected = &self.injected;
         writeln!(
             out,
-            "  injected    {} faulty frames: {} estimated without the wrong marker, {} refused, {} taken for good",
+            "  injected    {} faulty frames: {} estimated without the wrong marker, {} refused, {} accepted as good",
             injected.frames,
             injected.estimated_without_the_marker,
             injected.refused,

@@ -19,7 +19,7 @@ pub enum ReproduceError {
     Plot { path: PathBuf, reason: String },
     #[error("cannot print the results: {0}")]
     Print(std::io::Error),
-    #[error("setting {abscissa} of {experiment}: its markers leave the pose open")]
+    #[error("setting {abscissa} of {experiment}: its markers do not determine the pose")]
     NoBound {
         experiment: &'static str,
         abscissa: f64,

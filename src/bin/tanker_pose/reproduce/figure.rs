@@ -7,7 +7,7 @@ use super::monte_carlo::{Outcome, Point};
 use super::panel::{Curve, Figure, Line, Marker, Panel, Style};
 use super::scale::Axis;
 
-// Okabe and Ito's palette: told apart with any colour vision.
+// Okabe and Ito's palette: distinguishable with any colour vision.
 pub const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub const VERMILLION: RGBColor = RGBColor(213, 94, 0);
 pub const GREEN: RGBColor = RGBColor(0, 158, 115);

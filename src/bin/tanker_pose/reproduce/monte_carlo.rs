@@ -11,14 +11,14 @@ use super::error::ReproduceError;
 /// Trials between two movements of the progress bar.
 const TRIALS_A_TICK: u32 = 100;
 
-/// An experiment and what came out.
+/// An experiment and its results.
 pub struct Outcome {
     pub experiment: Experiment,
     /// In the order of its settings.
     pub points: Vec<Point>,
 }
 
-/// What came out of one setting.
+/// The results of one setting.
 pub struct Point {
     pub setting: Setting,
     pub bound: PaperBound,

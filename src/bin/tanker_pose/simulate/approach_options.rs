@@ -14,7 +14,7 @@ use tanker_pose::target::{MapBudget, MarkerMap};
 use crate::options::{self, CalibrationError, double};
 use crate::ros_options::between;
 
-/// The camera of the paper, for those who name none.
+/// The paper's camera, the default.
 pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");
 
 /// What the approach looks like.

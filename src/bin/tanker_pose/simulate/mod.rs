@@ -152,7 +152,7 @@ impl Simulation<'_> {
         match select(Box::pin(heard), signals.next()).await {
             Either::Left((Some(()), _)) => {}
             Either::Left((None, _)) => self.report.say(&format!(
-                "nobody listens to both feature_points and camera_info after {} s: going on all the same",
+                "no subscriber of both feature_points and camera_info after {} s: continuing without",
                 self.arguments.wait_s
             )),
             Either::Right(_) => return false,
@@ -170,7 +170,7 @@ impl Simulation<'_> {
             if let Some(late) = pace.make_up(number, Instant::now()) {
                 let late_s = late.as_secs_f64();
                 self.report
-                    .say(&format!("held up for {late_s:.1} s: going on from here"));
+                    .say(&format!("delayed by {late_s:.1} s: continuing from here"));
             }
             let due = smol::Timer::at(pace.due(number));
             if let Either::Right(_) = select(due, signals.next()).await {

@@ -23,7 +23,7 @@ impl Pace {
         self.start + Duration::from_secs_f64(number as f64 / self.rate_hz)
     }
 
-    /// Moves the schedule when the program was held up, as by a closed lid; returns by how much.
+    /// Moves the schedule when the program was blocked, as by a closed lid; returns by how much.
     pub fn make_up(&mut self, number: u64, now: Instant) -> Option<Duration> {
         let late = now.checked_duration_since(self.due(number))?;
         (late > PATIENCE).then(|| {

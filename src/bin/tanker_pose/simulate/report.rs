@@ -46,14 +46,14 @@ impl Report {
         }
     }
 
-    /// Says something to people.
+    /// Prints a line for people.
     pub fn say(&self, line: &str) {
         if !self.json {
             say(&self.bar, line);
         }
     }
 
-    /// Takes note of a published frame, `gross_error_id` being that of a detection that was moved.
+    /// Records a published frame, `gross_error_id` being that of a detection that was moved.
     pub fn frame(
         &mut self,
         number: u64,

@@ -57,7 +57,7 @@ impl Source {
         info: &camera::CameraInfo,
         frame_id: &str,
     ) -> Result<Self, EndpointError> {
-        // Announced in this order: who hears the detections has found what belongs to them.
+        // Announced in this order: a peer that receives detections has already discovered the others.
         let truth = ros.publisher(TRUTH, &OUTPUT)?;
         let camera_info = ros.publisher(CAMERA_INFO.name, &OUTPUT)?;
         let feature_points = ros.publisher(FEATURE_POINTS.name, &OUTPUT)?;

@@ -24,7 +24,7 @@ use crate::options::{self, CalibrationError, EstimatorOptions};
 
 /// Longest line that is read: a frame of ten thousand points.
 const MAX_LINE_BYTES: u64 = 1 << 20;
-/// What is passed over in search of the end of a longer one.
+/// What is skipped in search of the end of a longer one.
 const MAX_SKIPPED_BYTES: u64 = 1 << 28;
 
 #[derive(Debug, clap::Args)]
@@ -57,7 +57,7 @@ pub enum SolveError {
     MarkerMap(String),
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    #[error("cannot read line {number}: it has no end within {limit} bytes")]
+    #[error("cannot read line {number}: it exceeds {limit} bytes")]
     EndlessLine { number: u64, limit: u64 },
     #[error("cannot read the input: {0}")]
     Read(std::io::Error),

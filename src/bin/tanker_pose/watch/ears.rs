@@ -15,7 +15,7 @@ use tanker_pose::ros::topics::{ODOMETRY, POSE, STATUS};
 
 use super::heard::Heard;
 
-/// Best effort: a reliable subscriber that is held up would in the end cost the other ones messages.
+/// Best effort: a reliable subscriber that is blocked would in the end cost the other ones messages.
 const OUTPUTS: QosProfile = sensor_data(100);
 const DIAGNOSTICS: &str = "/diagnostics";
 

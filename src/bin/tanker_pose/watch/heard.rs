@@ -68,14 +68,14 @@ impl Heard {
         now.saturating_duration_since(self.since)
     }
 
-    /// Takes note of a pose.
+    /// Records a pose.
     pub fn on_pose(&mut self, message: &PoseWithCovarianceStamped, now: Instant) {
         if let Some(reading) = Reading::of(message) {
             self.pose = Some((reading, now));
         }
     }
 
-    /// Takes note of a frame's outcome.
+    /// Records a frame's outcome.
     pub fn on_status(&mut self, message: EstimatorStatus, now: Instant) {
         self.answers.push_back(Answer {
             at: now,
@@ -92,7 +92,7 @@ impl Heard {
         self.status = Some((message, now));
     }
 
-    /// Takes note of the track.
+    /// Records the track.
     pub fn on_odometry(&mut self, message: &Odometry, now: Instant) {
         let twist = &message.twist.twist.linear;
         // The twist stands in the axes of the tanker, the pose in those of the camera.
@@ -101,7 +101,7 @@ impl Heard {
             .map(|velocity| (velocity, now));
     }
 
-    /// Takes note of a report of the node's health.
+    /// Records a report of the node's health.
     pub fn on_diagnostics(&mut self, message: DiagnosticArray, now: Instant) {
         for status in message.status {
             if status.name.ends_with(": estimation") {

@@ -115,7 +115,7 @@ impl Watch {
     ) -> Result<Self, NamesError> {
         let began = Instant::now();
         let status = ros.names().topic(STATUS.name)?;
-        // A namespace or a remap says which node is meant; the plain name says nothing.
+        // A namespace or a remap selects the node; the plain name does not.
         let status = (status != format!("/{}", STATUS.name)).then_some(status);
         let node = arguments.node.as_deref();
         Ok(Self {
@@ -179,7 +179,7 @@ impl Watch {
             self.ears.attend(ros, &found.node)?;
             let name = found.name();
             if self.watched.as_ref() != Some(&name) {
-                // What another node said says nothing about this one.
+                // Messages of another node do not apply to this one.
                 self.heard = Heard::new(now);
                 self.watched = Some(name);
             }

@@ -19,7 +19,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Returns the terminal on standard output, its cursor hidden; `None` where there is none.
+    /// Returns the terminal on standard output, its cursor hidden; `None` without a terminal.
     pub fn open() -> Option<Self> {
         let term = Term::buffered_stdout();
         if !term.is_term() || console::is_dumb() {

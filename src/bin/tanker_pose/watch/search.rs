@@ -74,7 +74,7 @@ impl Search {
         }
     }
 
-    /// Takes note of what the domain holds.
+    /// Records what the domain holds.
     ///
     /// # Errors
     /// [`SeveralNodes`] when it is not clear which one is meant.
@@ -89,7 +89,7 @@ impl Search {
             .map(|(node, topic)| words(node.as_deref(), topic))
             .collect();
         if let Some(found) = self.found.take() {
-            // A name may come to be known only after its topics were.
+            // A name may be discovered later than its topics.
             let same = |node: &&&RunningNode| {
                 found.participants.contains(&node.participant) || identity(node) == found.identity
             };
@@ -157,7 +157,7 @@ impl Search {
         };
         let for_s = now.saturating_duration_since(self.began).as_secs();
         format!(
-            "{sought} in domain {domain}, searched for {for_s} s: {company}{others}. \
+            "{sought} in domain {domain} after {for_s} s: {company}{others}. \
              Is the node running, with ROS_DOMAIN_ID={domain}?{range}"
         )
     }

@@ -28,7 +28,7 @@ impl Row {
 /// Returns the rows of the table, whose number changes with the faults alone.
 pub fn rows(scene: &Scene) -> Vec<Row> {
     let (tone, state) = scene.state();
-    // A pose that is older is not shown: nobody shall take it for the present one.
+    // An older pose is not shown: it could be taken for the present one.
     let reading = scene
         .heard
         .pose(scene.now)

@@ -53,15 +53,15 @@ impl Scene<'_> {
         let silence = self.heard.silence(self.now);
         let listened = self.heard.listened(self.now);
         if silence.is_none() && listened < RECENT {
-            return (Tone::Plain, "listening for its frames".to_owned());
+            return (Tone::Plain, "waiting for its frames".to_owned());
         }
         let why = match self.heard.estimation_since_last_frame(self.now) {
             Some(report) => plain(&report.message),
             None if silence.unwrap_or(listened) < REPORT_EVERY => {
-                "no report on /diagnostics about it yet".to_owned()
+                "no report about it on /diagnostics yet".to_owned()
             }
             None => {
-                "no report on /diagnostics either: it hangs, was suspended or was killed".to_owned()
+                "no report on /diagnostics either: it hangs, or was suspended or killed".to_owned()
             }
         };
         let silent = age(silence.unwrap_or(listened));
@@ -71,7 +71,7 @@ impl Scene<'_> {
         )
     }
 
-    /// Returns the age of the latest pose, or that there was none.
+    /// Returns the age of the latest pose, or a note that there was none.
     pub fn pose_age(&self) -> String {
         match self.heard.pose(self.now) {
             None => "no pose yet".to_owned(),
@@ -144,7 +144,7 @@ impl Scene<'_> {
             None => {
                 return (
                     Tone::Plain,
-                    vec!["not known: no report on /diagnostics".to_owned()],
+                    vec!["unknown: no report on /diagnostics".to_owned()],
                 );
             }
             Some(faults) => faults
@@ -154,7 +154,7 @@ impl Scene<'_> {
         };
         if self.processes > 1 {
             all.push(format!(
-                "{} processes say that they are this node: what they say is mixed here \
+                "{} processes claim to be this node: their messages are mixed here \
                  (one that was killed counts for some time more)",
                 self.processes
             ));
@@ -242,7 +242,7 @@ mod tests {
             scene.state()
         };
         for milliseconds in [0, 500] {
-            let expected = (Tone::Plain, "listening for its frames".to_owned());
+            let expected = (Tone::Plain, "waiting for its frames".to_owned());
             assert_eq!(state(milliseconds), expected);
         }
         let (tone, words) = state(1500);
