@@ -218,7 +218,7 @@ fn marker_in_another_place_than_the_map_has_it_ends_trust() {
         let message = then.iter().find(|o| is_suspect(o)).expect("some").message();
         assert!(
             message.contains(&format!("marker {id} was left out of"))
-                && message.contains("its place in the marker map or the calibration"),
+                && message.contains("its position in the marker map or the calibration"),
             "{message}"
         );
     }

@@ -334,7 +334,7 @@ mod tests {
         let told = expected(angles(20.0, 0.0, 0.0), Angles::default());
         let (_, words) = found(&told, &truth, truth.nominal);
         assert!(
-            words.contains("likely roll and pitch of camera_mount exchanged (0.0° off then)"),
+            words.contains("likely roll and pitch of camera_mount exchanged (then 0.0° off)"),
             "{words}"
         );
 
@@ -369,7 +369,7 @@ mod tests {
         let (_, words) = found(&told, &truth, truth.nominal);
         assert!(
             words.ends_with(
-                "the camera_mount is roll 3°, pitch 33°, yaw -21° and not roll 0°, pitch 0°, yaw 0°"
+                "camera_mount is roll 3°, pitch 33°, yaw -21° rather than roll 0°, pitch 0°, yaw 0°"
             ),
             "{words}"
         );

@@ -18,7 +18,7 @@ pub enum Region {
     Cylinder {
         /// Where it begins along x.
         min_x_m: f64,
-        /// Where it ends.
+        /// The state after.
         max_x_m: f64,
         /// Its radius.
         radius_m: f64,

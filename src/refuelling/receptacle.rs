@@ -29,7 +29,7 @@ pub struct RefuellingGeometry {
 pub struct RefuellingGeometryError {
     /// Which part of the geometry.
     pub what: &'static str,
-    /// What it must be.
+    /// The requirement.
     pub expected: &'static str,
 }
 

@@ -29,7 +29,7 @@ pub enum NodeError {
     MapUnreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The marker map cannot be used.

@@ -25,7 +25,7 @@ ROS arguments:
 pub struct Arguments {
     /// Renames of the node and of its topics, in the order given.
     pub remaps: Vec<RemapRule>,
-    /// `-p` and parameter files, in the order given; what counts of them, [`super::overrides`] says.
+    /// `-p` and parameter files, in the order given; [`super::overrides`] defines their precedence.
     pub parameters: Vec<ParameterSource>,
     /// Log levels as (logger, level), in the order given; no logger: all of them.
     pub log_levels: Vec<(Option<String>, LevelFilter)>,
@@ -35,7 +35,7 @@ pub struct Arguments {
     pub console_logs: bool,
 }
 
-/// What gives values to parameters.
+/// A source of values for parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterSource {
     /// `--params-file`.
@@ -45,7 +45,7 @@ pub enum ParameterSource {
 }
 
 impl Default for Arguments {
-    /// Returns what an empty command line says.
+    /// Returns the arguments of an empty command line.
     fn default() -> Self {
         Self {
             remaps: Vec::new(),
@@ -57,7 +57,7 @@ impl Default for Arguments {
     }
 }
 
-/// What the node's command line asks for.
+/// The node's command line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Command {
     /// Start.
@@ -85,7 +85,7 @@ pub enum ArgumentError {
         /// What is wrong with it.
         reason: String,
     },
-    /// An argument that stands last and needs another one behind it.
+    /// The last argument lacks its value.
     #[error("argument {argument} needs a value after it")]
     NoValue {
         /// The argument.
@@ -104,13 +104,13 @@ pub enum ArgumentError {
     Unsupported {
         /// The argument.
         argument: &'static str,
-        /// What to do instead.
+        /// The alternative.
         instead: &'static str,
     },
 }
 
 impl Command {
-    /// Returns what the node is asked to do by its arguments, the program's own name left out.
+    /// Returns the command in the node's arguments, without the program's own name.
     ///
     /// # Errors
     /// [`ArgumentError`] when an argument is malformed, not a ROS argument, or not supported.

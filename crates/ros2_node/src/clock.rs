@@ -23,20 +23,20 @@ pub struct NodeClock {
     simulated: Arc<Mutex<Option<Simulated>>>,
 }
 
-/// How long simulated time has not come.
+/// A silence of simulated time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockSilence {
-    /// When the last one came, or since when it is wanted.
+    /// When the last one arrived, or since when it is enabled.
     pub since: Instant,
-    /// Whether one ever came.
+    /// Whether one ever arrived.
     pub ever: bool,
 }
 
 #[derive(Debug)]
 struct Simulated {
-    /// None until a first one has come.
+    /// None until the first one.
     time: Option<Time>,
-    /// When it came, or since when it is wanted.
+    /// When it arrived, or since when it is enabled.
     since: Instant,
     jumps: Jumps,
     /// The last jump that was not yet taken.
@@ -44,7 +44,7 @@ struct Simulated {
 }
 
 impl NodeClock {
-    /// Returns the node's time; while it is simulated, zero until a first `/clock` has come, as in all of ROS.
+    /// Returns the node's time; while it is simulated, zero until the first `/clock`, as in all of ROS.
     #[must_use]
     pub fn now(&self) -> Time {
         match &*self.lock() {
@@ -53,7 +53,7 @@ impl NodeClock {
         }
     }
 
-    /// Begins or ends simulated time; false when that changes nothing.
+    /// Starts or ends simulated time; false when that changes nothing.
     fn simulate(&self, on: bool, now: Instant) -> bool {
         let mut simulated = self.lock();
         let changes = on != simulated.is_some();
@@ -84,7 +84,7 @@ impl NodeClock {
         self.lock().as_mut().and_then(|s| s.jump.take())
     }
 
-    /// Returns since when simulated time is wanted and none has come; `None` while time is the system's.
+    /// Returns since when simulated time is enabled and has not arrived; `None` while time is the system's.
     #[must_use]
     pub fn silence(&self) -> Option<ClockSilence> {
         self.lock().as_ref().map(|simulated| ClockSilence {

@@ -1,6 +1,6 @@
 //! The ROS 2 distributions that this build talks with, chosen by a feature of the crate.
 //!
-//! What nodes say to each other differs in one place: up to Humble the announcements that name nodes and their
+//! The wire protocol of distributions differs in one place: up to Humble the announcements that name nodes and their
 //! endpoints hold identifiers of 24 bytes, since Iron of 16. Topics, services and messages are the same on the wire.
 
 use ros2_client::{COMPILED_ROS_DISTRO, RosDistro};
@@ -34,7 +34,7 @@ pub const fn built_for() -> &'static str {
     COMPILED_ROS_DISTRO.as_str()
 }
 
-/// Returns what to say when `ROS_DISTRO` names a distribution whose nodes would not find this one by its name.
+/// Returns a warning when `ROS_DISTRO` names a distribution whose nodes cannot find this one by its name.
 /// Names not known here are taken for later ones.
 #[must_use]
 pub fn mismatch(ros_distro: &str) -> Option<String> {

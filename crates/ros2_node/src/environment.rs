@@ -1,4 +1,4 @@
-//! What the ROS environment variables ask for, checked: ros2-client itself reads none of them.
+//! The ROS environment variables, checked: ros2-client itself reads none of them.
 
 use std::net::Ipv4Addr;
 
@@ -7,7 +7,7 @@ use super::distribution;
 /// The highest domain whose ports fit below 65536; `RustDDS` wraps silently above it.
 pub const MAX_DOMAIN_ID: u16 = 232;
 
-/// How far discovery goes.
+/// The range of discovery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DiscoveryRange {
     /// All interfaces, by multicast.
@@ -33,7 +33,7 @@ impl DiscoveryRange {
 pub struct Environment {
     /// DDS domain, at most [`MAX_DOMAIN_ID`].
     pub domain_id: u16,
-    /// How far discovery goes.
+    /// The range of discovery.
     pub discovery_range: DiscoveryRange,
     /// Settings that are understood but cannot be honoured, for the log.
     pub warnings: Vec<String>,
@@ -49,13 +49,13 @@ pub enum EnvironmentError {
          (the ports of higher domains do not exist)"
     )]
     DomainId {
-        /// What the variable holds.
+        /// The value of the variable.
         value: String,
     },
     /// Not one of the two values.
     #[error("ROS_LOCALHOST_ONLY is {value:?}: expected 0 or 1")]
     LocalhostOnly {
-        /// What the variable holds.
+        /// The value of the variable.
         value: String,
     },
     /// Not one of the names that ROS knows.
@@ -63,7 +63,7 @@ pub enum EnvironmentError {
         "ROS_AUTOMATIC_DISCOVERY_RANGE is {value:?}: expected SUBNET, LOCALHOST or SYSTEM_DEFAULT"
     )]
     DiscoveryRange {
-        /// What the variable holds.
+        /// The value of the variable.
         value: String,
     },
     /// Discovery switched off altogether.
@@ -87,7 +87,7 @@ pub enum EnvironmentError {
 }
 
 impl Environment {
-    /// Returns what this process's environment asks for.
+    /// Returns the settings of this process's environment.
     ///
     /// # Errors
     /// [`EnvironmentError`] names the variable, its value, and what was expected.
@@ -99,7 +99,7 @@ impl Environment {
         })
     }
 
-    /// Returns what the variables found by `lookup` ask for; an empty variable counts as unset.
+    /// Returns the settings of the variables found by `lookup`; an empty variable counts as unset.
     ///
     /// # Errors
     /// As [`Self::from_process`].

@@ -1,4 +1,4 @@
-//! The other ends of the node's topics: which there are, and why nothing passes to or from some of them.
+//! The other endpoints of the node's topics, and why some of them do not match.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,7 +23,7 @@ pub struct OwnEnd {
     pub qos: QosPolicies,
 }
 
-/// Why nothing passes between an end of ours and one of another node; the words are for people.
+/// Why an endpoint of this node and one of another do not match; the text is for display.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Misfit {
     /// They do not mean the same kind of message.
@@ -32,12 +32,12 @@ pub enum Misfit {
     Qos(String),
 }
 
-/// What the graph holds beside the node.
+/// The graph apart from the node.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Graph {
-    /// Ends of others from or to which nothing passes; equal ones once.
+    /// Endpoints of others that do not match; equal ones once.
     pub misfits: BTreeSet<Misfit>,
-    /// Publishers that are heard, by the absolute name of the topic.
+    /// Matching publishers, by the absolute name of the topic.
     pub heard: BTreeMap<String, usize>,
 }
 
@@ -93,7 +93,7 @@ impl Graph {
         }
     }
 
-    /// Returns how many publishers of the topic with this absolute name are heard.
+    /// Returns how many publishers match on the topic with this absolute name.
     #[must_use]
     pub fn heard(&self, topic: &str) -> usize {
         self.heard.get(topic).copied().unwrap_or(0)
@@ -137,7 +137,7 @@ fn misfit(own: &OwnEnd, other: &OtherEnd) -> Option<Misfit> {
     }))
 }
 
-/// What is not said is the default, which is not the same for both sides.
+/// A missing policy is the default, which differs for the two sides.
 fn offer(qos: &QosPolicies, policy: QosPolicyId) -> String {
     shown(qos, policy, "reliable")
 }

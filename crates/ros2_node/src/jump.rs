@@ -14,7 +14,7 @@ pub struct Jumps {
 }
 
 impl Jumps {
-    /// Takes a time that came at `now`; returns the words if it does not follow the one before.
+    /// Takes a time that arrived at `now`; returns a description of the jump if it does not follow the one before.
     pub fn take(&mut self, time: Time, now: Instant) -> Option<String> {
         let (before, then) = self.previous.replace((time, now))?;
         let passed_s = now.saturating_duration_since(then).as_secs_f64();

@@ -1,4 +1,4 @@
-//! Leaving the graph so that others notice at once.
+//! Leaving the graph so that peers notice at once.
 //!
 //! `RustDDS` announces its end without the key hash that Fast DDS looks the participant up by: the
 //! node's name goes at once, but its endpoints stay in other nodes' graphs until the lease runs out,
@@ -34,7 +34,7 @@ impl Farewell {
         }
     }
 
-    /// Tells the other participants. To be called after the participant is dropped, or it would
+    /// Announces the departure to other participants. To be called after the participant is dropped, or it would
     /// announce itself again. Best effort: a lost packet costs the others the wait for the lease.
     pub fn send(&self) {
         let packet = self.packet();

@@ -1,6 +1,6 @@
 //! What a well-behaved ROS 2 node needs beside [`ros2_client`], the client library in Rust that needs no ROS installation.
 //!
-//! `ros2-client` speaks: topics, services, discovery. What makes a node one that ROS's tools and launch files can work
+//! `ros2-client` provides topics, services and discovery. What makes a node one that ROS's tools and launch files can work
 //! with is here: the command line, remaps and parameter files as rcl reads them, environment variables, parameters with
 //! descriptions and ranges behind their services, `qos_overrides`, a managed node's lifecycle, `/clock`, `/rosout`, and
 //! leaving so that others notice.
@@ -10,24 +10,24 @@
 //! ```text
 //! node                               all of it together
 //! arguments, rules, tokens           the command line, and the grammar of one value in it
-//! environment, distribution          what variables ask for; which ROS 2 the build talks with
+//! environment, distribution          environment variables; the ROS 2 distribution of the build
 //! names                              the node's and its topics' names after remaps
-//! scalar, parameter_file             what words mean; the sections of a parameter file
+//! scalar, parameter_file             types of scalars; the sections of a parameter file
 //! overrides, start_values            which value counts for a node; all its parameters at the start
 //! parameters, qos_overrides          their declaration; parameters while the node runs, behind their services
-//! clock, jump, system_clock          the node's time, the system's or a simulation's, and where it does not go on
+//! clock, jump, system_clock          the node's time, the system's or a simulation's, and jumps of it
 //! participant, leave                 into the graph, and out of it
 //! lifecycle                          a managed node's states, behind their services
-//! service, rtps                      services, and what of the wire protocol is written here
+//! service, rtps                      services, and RTPS messages that are written here
 //! messages                           the messages of all this, and the trait of all messages
-//! newest                             what is left out when more samples wait than a topic's depth
-//! graph, running_nodes               the other ends of the topics; nodes that are found by what they publish
+//! newest                             skipping samples beyond a topic's depth
+//! graph, running_nodes               the other endpoints of topics; nodes found by what they publish
 //! logging, once                      log lines as ROS has them; lasting conditions are logged once
-//! text, text_file                    foreign words in messages for people; files from outside
+//! text, text_file                    foreign text in messages; files from outside
 //! ```
 //!
 //! Without the feature `client`, which each feature of a distribution brings, there are only `text`, `text_file` and the
-//! declaration of [`parameters`]: for those parts of a program that know nothing of ROS.
+//! declaration of [`parameters`]: for the parts of a program that do not depend on ROS.
 
 pub mod parameters;
 pub mod text;

@@ -25,7 +25,7 @@ const DEFAULT_FILTER: &str = "warn,rustdds=error,rustdds::structure::dds_cache=o
     ros2_client=error,ros2_client::distributions=off,cdr_encoding=error";
 /// This crate's own lines are logged under the node's name, too.
 const KIT: &str = "ros2_node";
-/// Where the client library repeats what it published to /rosout.
+/// The log target of the client library's copies of /rosout messages.
 const ECHO: &str = "ros2_client::rosout";
 /// Leaving, `RustDDS` reports as errors that it was not a member of groups which it never joined.
 const FALSE_ALARM_AT_END: &str = "rustdds::network";
@@ -76,7 +76,7 @@ pub fn start(arguments: &Arguments, names: &NodeNames, own: &'static str) {
     }
 }
 
-/// Returns what is shown: the defaults, changed by the variable and by `--log-level`.
+/// Returns the filter: the defaults, changed by the variable and by `--log-level`.
 fn console(
     arguments: &Arguments,
     names: &NodeNames,
@@ -121,7 +121,7 @@ pub fn start_rosout(handle: NodeLoggingHandle) {
     set_rosout(Some(handle), false);
 }
 
-/// Ends what [`start_rosout`] began: the handle holds a publisher of the node, which has to be gone
+/// Ends [`start_rosout`]: the handle holds a publisher of the node, which has to be gone
 /// before the node is.
 pub fn stop_rosout() {
     set_rosout(None, true);

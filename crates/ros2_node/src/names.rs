@@ -28,10 +28,10 @@ pub enum NamesError {
     Unsupported {
         /// The expanded name.
         name: String,
-        /// What the client library objects to.
+        /// The client library's error.
         reason: String,
     },
-    /// A remap of something that begins with two underscores and is not known.
+    /// A remap of an unknown name that begins with two underscores.
     #[error(
         "cannot remap {}: of the names with two underscores only __node, __name and __ns exist",
         quoted(from)

@@ -19,7 +19,7 @@ const MOST: usize = 1024;
 pub struct Lost(Rc<Cell<u64>>);
 
 impl Lost {
-    /// Returns the count, and begins a new one.
+    /// Returns the count, and resets it.
     #[must_use]
     pub fn take(&self) -> u64 {
         self.0.take()

@@ -1,5 +1,5 @@
 //! A node with all that its peers expect of it: parameters behind their services, a lifecycle if it is managed, time,
-//! log, and an end that others notice.
+//! log, and a shutdown that peers notice.
 //!
 //! The parts are in the other modules, for programs that put them together in another way.
 //!
@@ -49,11 +49,11 @@ use crate::start_values::{StartParameterError, start_values};
 /// How often a node looks whether its middleware still runs.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// What a node has to do next.
+/// The next task of a node.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Event {
-    /// SIGINT or SIGTERM has come: drop the endpoints, and [`Node::close`].
+    /// SIGINT or SIGTERM has arrived: drop the endpoints, and [`Node::close`].
     Stop,
     /// These are the parameters after a change.
     Parameters(Parameters),
@@ -116,7 +116,7 @@ impl Builder {
         self
     }
 
-    /// Makes it a managed node: unconfigured until others change its state.
+    /// Makes it a managed node: unconfigured until a transition is requested.
     #[must_use]
     pub const fn managed(mut self) -> Self {
         self.managed = true;
@@ -180,7 +180,7 @@ impl Builder {
 
 /// A node in the graph, with what its peers expect of it.
 ///
-/// It lives between [`Builder::open`] and [`Node::close`]; dropped without it, others notice only after a while.
+/// It lives between [`Builder::open`] and [`Node::close`]; dropped without it, peers notice only after a while.
 pub struct Node {
     services: Option<ParameterServices>,
     lifecycle: Option<Lifecycle>,
@@ -262,7 +262,7 @@ impl Node {
     /// [`MiddlewareGone`]: the node can only be closed.
     pub async fn next(&mut self) -> Result<Event, MiddlewareGone> {
         loop {
-            // A channel that others have closed is pending, and not ready without end.
+            // A closed channel is pending rather than always ready.
             select_biased! {
                 _ = self.signals.next().fuse() => return Ok(Event::Stop),
                 () = received(&self.changes).fuse() => {
@@ -285,7 +285,7 @@ impl Node {
         }
     }
 
-    /// Leaves the graph and tells the others. Publishers and subscriptions must be dropped before.
+    /// Leaves the graph and announces it. Publishers and subscriptions must be dropped before.
     pub fn close(self) {
         if let Some(lifecycle) = self.lifecycle {
             lifecycle.close();

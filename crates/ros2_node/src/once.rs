@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// A fault that comes and goes faster than this is logged at this interval.
 const QUIET: Duration = Duration::from_secs(5);
 
-/// Decides what is worth a log line when many things are judged good or faulty, one after the other.
+/// Decides which of many good or faulty results are worth a log line.
 ///
 /// Time is an argument, so that tests need no clock.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ impl<Fault: Copy + Ord> SaidOnce<Fault> {
         true
     }
 
-    /// Records a good thing; returns how many were faulty before it if the end of a fault is to
+    /// Records a good one; returns how many were faulty before it if the end of a fault is to
     /// be said now.
     pub fn good(&mut self) -> Option<u64> {
         self.open.take().map(|_| std::mem::take(&mut self.faulty))

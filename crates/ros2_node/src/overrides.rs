@@ -12,7 +12,7 @@ use super::arguments::ParameterSource;
 use super::parameter_file::{self, FileParameter, ParameterFileError, Section};
 use crate::parameters::ParameterValue;
 
-/// The pattern that stands for all nodes.
+/// The pattern that matches all nodes.
 const EVERY_NODE: &str = "/**";
 
 /// A value given at the start for a node.
@@ -20,9 +20,9 @@ const EVERY_NODE: &str = "/**";
 pub struct Override {
     /// The parameter.
     pub name: String,
-    /// None where something stands that no parameter can hold: a list, a map, nothing.
+    /// None for a value that no parameter can hold: a list, a map, nothing.
     pub value: Option<ParameterValue>,
-    /// Where it stands.
+    /// Its place.
     pub place: Place,
     /// Whether it stands under a file's pattern for several nodes, which may mean others.
     pub is_shared: bool,
@@ -41,7 +41,7 @@ pub struct Repetition {
     pub is_shared: bool,
 }
 
-/// Where a value stands.
+/// The place of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// In a file.
@@ -69,7 +69,7 @@ impl std::fmt::Display for Place {
 /// All values given at the start for one node.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Overrides {
-    /// One for each parameter, the one that counts.
+    /// The effective one for each parameter.
     pub values: Vec<Override>,
     /// A value that ROS ignores silently.
     pub repetitions: Vec<Repetition>,
@@ -127,7 +127,7 @@ impl Overrides {
     }
 }
 
-/// Returns of each parameter the value that comes last, in the order of these.
+/// Returns the last value of each parameter, in their order.
 fn last_of_each(given: impl Iterator<Item = Override>) -> Vec<Override> {
     let mut values: Vec<Option<Override>> = Vec::new();
     let mut place_of = HashMap::new();

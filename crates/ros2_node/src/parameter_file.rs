@@ -18,10 +18,10 @@ use super::{scalar, tokens};
 use crate::parameters::ParameterValue;
 use crate::text::clip;
 
-/// The parameters that stand under one node name or pattern.
+/// The parameters under one node name or pattern.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
-    /// Absolute node name, or a pattern of such.
+    /// Absolute node name, or a pattern of them.
     pub pattern: String,
     /// The same as it is written: rcl keeps `/node` and `node` apart.
     pub written: String,
@@ -52,7 +52,7 @@ pub enum ParameterFileError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// Not YAML.
@@ -60,7 +60,7 @@ pub enum ParameterFileError {
     Yaml {
         /// The file.
         path: PathBuf,
-        /// What the parser says, with line and column.
+        /// The parser's error, with line and column.
         reason: String,
     },
     /// A node's name that no node can have.
@@ -70,7 +70,7 @@ pub enum ParameterFileError {
     BadNode {
         /// The file.
         path: PathBuf,
-        /// Where its parameters begin.
+        /// The place of its parameters.
         line: u64,
         /// As it is written.
         name: String,
@@ -146,7 +146,7 @@ impl Section {
     }
 }
 
-/// Returns the value of one word of YAML, as `-p` has it; `None` where it is a list or nothing.
+/// Returns the value of one YAML scalar, as after `-p`; `None` for a list or nothing.
 ///
 /// # Errors
 /// The reason why it is no YAML, or that it is a map.
@@ -260,13 +260,13 @@ enum Value {
     Map(Vec<(String, Tree)>),
 }
 
-/// Why a text is not read, in words for people.
+/// Why a text is not read, for display.
 struct Fault {
     line: u64,
     reason: String,
 }
 
-/// Events of the parser -> a tree. Serde's way would lose what a word looked like before it became a value.
+/// Events of the parser -> a tree. With serde the spelling of a scalar would be lost.
 struct Reader<'text> {
     events: Parser<'text, granit_parser::StrInput<'text>>,
 }
@@ -366,7 +366,7 @@ impl From<&ScanError> for Fault {
     }
 }
 
-/// Returns what a word means; `None` for nothing at all.
+/// Returns the value of a scalar; `None` for an empty one.
 fn meaning(word: &str, style: ScalarStyle, tag: Option<&Tag>) -> Option<ParameterValue> {
     // rcl minds quotes and the full tag, and not whether a word stands in a block.
     let is_quoted = matches!(style, ScalarStyle::SingleQuoted | ScalarStyle::DoubleQuoted);

@@ -1,4 +1,4 @@
-//! A node in the ROS graph: opened from arguments and environment, closed so that others notice.
+//! A node in the ROS graph: opened from arguments and environment, closed so that peers notice.
 //!
 //! ```no_run
 //! use ros2_node::{arguments::Arguments, environment::Environment, messages::Header};
@@ -314,7 +314,7 @@ impl RosNode {
         Ok(self.node.publisher_count(&self.names.topic(topic)?))
     }
 
-    /// Leaves the graph and tells the others. Publishers and subscriptions must be dropped before.
+    /// Leaves the graph and announces it. Publishers and subscriptions must be dropped before.
     pub fn close(self) {
         let Self {
             node,

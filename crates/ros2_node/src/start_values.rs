@@ -17,7 +17,7 @@ pub enum StartParameterError {
     /// A value.
     #[error("{place}: {source}")]
     Value {
-        /// Where it stands.
+        /// Its place.
         place: Place,
         /// What is wrong.
         source: StartValueError,
@@ -37,7 +37,7 @@ pub enum StartParameterError {
     /// A list, a map, or nothing where a value belongs.
     #[error("{place}: parameter {name:?} needs a bool, a number or text")]
     NoScalar {
-        /// Where it stands.
+        /// Its place.
         place: Place,
         /// The parameter.
         name: String,

@@ -26,11 +26,11 @@ pub struct EstimatorOptions {
     /// in one plane), the last trusted attitude or else the nominal one (3 points), or all attitudes (4 points)
     #[arg(long, default_value = Initialisation::WORDS[0], value_parser = word::<Initialisation>())]
     initialisation: Initialisation,
-    /// Which estimate is wanted: least squared pixel residuals over their variances, or none, the converged orthogonal
+    /// The estimate: least squared pixel residuals over their variances, or none, the converged orthogonal
     /// iteration of the paper with its sandwich covariance
     #[arg(long, default_value = Refinement::WORDS[0], value_parser = word::<Refinement>())]
     refinement: Refinement,
-    /// Standard deviation of pixels that bring none, px
+    /// Standard deviation of pixels without their own, px
     #[arg(long, value_name = "PX", default_value_t = KEYS.pixel_sigma_px.default(), value_parser = double(KEYS.pixel_sigma_px))]
     pub pixel_sigma_px: f64,
     /// Points nearer than this to the edge of the image are left out, px; 0: none
@@ -90,7 +90,7 @@ pub struct EstimatorOptions {
 }
 
 impl EstimatorOptions {
-    /// Returns the settings that the options say.
+    /// Returns the settings of the options.
     pub fn settings(&self) -> EstimatorSettings {
         EstimatorSettings {
             initialisation: self.initialisation,
@@ -157,12 +157,12 @@ fn word<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
         .try_map(|word| T::from_word(&word).ok_or("it is none of the words"))
 }
 
-/// Returns a parser of what the parameter of the same name allows.
+/// Returns a parser of the values that the parameter of the same name allows.
 pub fn double(key: Key<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone {
     parser(key, ParameterValue::Double)
 }
 
-/// Returns a parser of what the parameter of the same name allows.
+/// Returns a parser of the values that the parameter of the same name allows.
 fn whole(key: Key<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
     parser(key, ParameterValue::Integer)
 }

@@ -35,7 +35,7 @@ impl RosOptions {
     }
 }
 
-/// Why the parameters given to a tool that has none cannot be meant.
+/// Why parameters given to a tool without any are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum NoParametersError {
     #[error(

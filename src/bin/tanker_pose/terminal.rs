@@ -1,4 +1,4 @@
-//! What tools say while a progress bar may stand below.
+//! Output of tools above a progress bar.
 
 use std::io::Write;
 use std::time::Duration;
@@ -15,7 +15,7 @@ pub fn progress_bar(length: u64) -> ProgressBar {
     bar
 }
 
-/// Prints a line on standard output, above the bar. A reader that has seen enough is no fault.
+/// Prints a line on standard output, above the bar. A closed pipe is not an error.
 pub fn say(bar: &ProgressBar, line: &str) {
     bar.suspend(|| {
         let mut out = std::io::stdout().lock();

@@ -42,7 +42,7 @@ pub enum ConsumersError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The setup cannot be used.

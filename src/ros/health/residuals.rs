@@ -286,7 +286,7 @@ mod tests {
         })
         .expect("10 s");
         assert!(
-            words.contains("the sigmas (pixel_sigma_px") && words.contains("2.0 times as large"),
+            words.contains("the sigmas (pixel_sigma_px") && words.contains("by a factor of 2.0"),
             "{words}"
         );
         let words = residuals.in_words(Some(by(1.05))).expect("as before");

@@ -145,7 +145,7 @@ mod tests {
             ..image(1.7e9)
         };
         let words = said(|_| booted, 30).expect("a count from a start");
-        assert!(words.starts_with("say 512 s since 1970"), "{words}");
+        assert!(words.starts_with("are 512 s since 1970"), "{words}");
     }
 
     #[test]

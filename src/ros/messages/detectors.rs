@@ -38,7 +38,7 @@ pub struct BoundingBox2D {
 /// `vision_msgs/ObjectHypothesis`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ObjectHypothesis {
-    /// What it may be.
+    /// Its allowed values.
     pub class_id: String,
     /// How sure the detector is.
     pub score: f64,
@@ -47,7 +47,7 @@ pub struct ObjectHypothesis {
 /// `vision_msgs/ObjectHypothesisWithPose`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectHypothesisWithPose {
-    /// What it may be.
+    /// Its allowed values.
     pub hypothesis: ObjectHypothesis,
     /// Where it would be.
     pub pose: PoseWithCovariance,
@@ -58,7 +58,7 @@ pub struct ObjectHypothesisWithPose {
 pub struct Detection2D {
     /// Of the image; often left empty.
     pub header: Header,
-    /// What it may be.
+    /// Its allowed values.
     pub results: Vec<ObjectHypothesisWithPose>,
     /// Where it is in the image.
     pub bbox: BoundingBox2D,

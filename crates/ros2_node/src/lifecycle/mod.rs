@@ -1,6 +1,6 @@
-//! A managed node: its state, the services by which others see and change it, and the events that tell of changes.
+//! A managed node: its state, the services that read and change it, and the events about changes.
 //!
-//! The services only pass on what is asked; the node's own loop carries it out between two messages, and the answer
+//! The services only forward requests; the node's own loop carries them out between two messages, and the answer
 //! of `~/change_state` waits for that.
 
 mod services;
@@ -49,7 +49,7 @@ impl Lifecycle {
         Ok((lifecycle, requests))
     }
 
-    /// Returns where the node stands.
+    /// Returns the node's state.
     #[must_use]
     pub fn state(&self) -> State {
         self.state.get()

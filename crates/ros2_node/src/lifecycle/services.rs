@@ -14,7 +14,7 @@ use crate::service::Service;
 
 const PACKAGE: &str = "lifecycle_msgs";
 
-/// Opens the services; what they are asked to change goes to `requests`.
+/// Opens the services; requests for changes go to `requests`.
 pub(super) fn open(
     ros: &mut RosNode,
     state: &SharedState,
@@ -104,7 +104,7 @@ fn transition_message(transition: &Transition) -> LifecycleTransition {
     }
 }
 
-/// Returns the event that tells of a transition, without its time.
+/// Returns the event about a transition, without its time.
 pub(super) fn event(transition: &Transition) -> TransitionEvent {
     TransitionEvent {
         timestamp: 0,

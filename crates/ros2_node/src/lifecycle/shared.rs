@@ -1,4 +1,4 @@
-//! What the services and the loop share.
+//! State shared by the services and the loop.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

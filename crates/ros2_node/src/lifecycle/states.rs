@@ -1,7 +1,7 @@
-//! The states of a managed node and the transitions between them: what others find in the services' answers,
+//! The states of a managed node and the transitions between them: as in the services' answers,
 //! in the numbers, words and order of `rcl_lifecycle`.
 
-/// Where a managed node stands.
+/// The state of a managed node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(missing_docs, reason = "the names are those of lifecycle_msgs/State")]
 pub enum State {
@@ -19,7 +19,7 @@ pub enum State {
 }
 
 impl State {
-    /// All of them; those that last come first.
+    /// All of them; primary states first.
     pub const ALL: [Self; 11] = [
         Self::Unknown,
         Self::Unconfigured,
@@ -70,7 +70,7 @@ impl State {
         }
     }
 
-    /// Returns the transitions that begin here.
+    /// Returns the transitions from this state.
     pub fn transitions(self) -> impl Iterator<Item = &'static Transition> {
         GRAPH
             .iter()
@@ -119,9 +119,9 @@ pub struct Transition {
     pub id: u8,
     /// Its name, the same for several of them.
     pub label: &'static str,
-    /// Where it begins.
+    /// The state before.
     pub start: State,
-    /// Where it ends.
+    /// The state after.
     pub goal: State,
 }
 

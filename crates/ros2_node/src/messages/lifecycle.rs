@@ -32,9 +32,9 @@ pub struct LifecycleTransition {
 pub struct TransitionDescription {
     /// The transition.
     pub transition: LifecycleTransition,
-    /// Where it begins.
+    /// The state before.
     pub start_state: LifecycleState,
-    /// Where it ends.
+    /// The state after.
     pub goal_state: LifecycleState,
 }
 

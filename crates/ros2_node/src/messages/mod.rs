@@ -1,7 +1,7 @@
 //! Messages that every ROS node speaks, as serde structs in the order of their `.msg` files.
 //!
 //! CDR carries no field names: the order of the fields here **is** the wire format. Nothing is checked here: a decoded
-//! message may hold anything that its bytes can say.
+//! message may hold any values.
 //!
 //! A message of your own is a struct with the fields of its `.msg` file, in their order:
 //!

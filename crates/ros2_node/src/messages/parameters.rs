@@ -86,9 +86,9 @@ pub struct ParameterDescriptor {
     pub name: String,
     /// One of [`parameter_type`].
     pub kind: u8,
-    /// What it does.
+    /// Its description.
     pub description: String,
-    /// What a range cannot say.
+    /// Constraints beyond a range.
     pub additional_constraints: String,
     /// Whether it is fixed.
     pub read_only: bool,
@@ -116,11 +116,11 @@ pub struct ParameterEvent {
     pub stamp: Time,
     /// Absolute name of the node.
     pub node: String,
-    /// Those that there were not before.
+    /// New ones.
     pub new_parameters: Vec<WireParameter>,
-    /// Those that were given a value.
+    /// Changed ones.
     pub changed_parameters: Vec<WireParameter>,
-    /// Those that are gone.
+    /// Deleted ones.
     pub deleted_parameters: Vec<WireParameter>,
 }
 
@@ -152,6 +152,6 @@ pub struct ListRequest {
 pub struct ListResult {
     /// The parameters.
     pub names: Vec<String>,
-    /// What stands before the last dot of their names, each once.
+    /// The part before the last dot of their names, each once.
     pub prefixes: Vec<String>,
 }

@@ -23,7 +23,7 @@ pub struct Duration {
 /// `std_msgs/Header`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Header {
-    /// When the data was true.
+    /// The time of the data.
     pub stamp: Time,
     /// The frame that the data is expressed in.
     pub frame_id: String,
@@ -39,8 +39,8 @@ pub struct TriggerRequest {
 /// Response of `std_srvs/Trigger`.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TriggerResponse {
-    /// Whether it was done.
+    /// Whether it succeeded.
     pub success: bool,
-    /// For people.
+    /// For display.
     pub message: String,
 }

@@ -1,4 +1,4 @@
-//! Declarations for people: a parameter file with comments, and tables for a page.
+//! Declarations as documents: a parameter file with comments, and tables for a page.
 
 use super::spec::{Kind, ParameterSpec};
 use super::value::ParameterValue;
@@ -6,7 +6,7 @@ use super::value::ParameterValue;
 /// Parameters under one title.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
-    /// What they are about.
+    /// Their title.
     pub title: &'static str,
     /// Their declarations.
     pub parameters: &'static [ParameterSpec],
@@ -16,7 +16,7 @@ pub struct Section {
 const COMMENT_COLUMN: usize = 37;
 const LINE_LENGTH: usize = 120;
 
-/// Returns a parameter file for any node, with every parameter at its default, and comments that say the rest.
+/// Returns a parameter file for any node, with every parameter at its default, and comments with the rest.
 ///
 /// `(fixed)` marks what is read-only once the node runs.
 #[must_use]

@@ -1,9 +1,9 @@
-//! Parameters: what a node declares, and what it does while it runs.
+//! Parameters: their declaration, and changes while the node runs.
 //!
 //! [`declare_parameters!`](crate::declare_parameters) declares them, each once: with a type, a default, a range, a unit and
 //! words. [`Parameters`] holds a checked value for each, to be read by a typed [`Key`]. While the node runs,
-//! [`SharedParameters`] answers what its services are asked, and [`ParameterServices`] are the services themselves.
-//! [`parameter_file`] and [`markdown_tables`] show the declarations to people.
+//! [`SharedParameters`] answers the requests of the services, and [`ParameterServices`] are the services themselves.
+//! [`parameter_file`] and [`markdown_tables`] present the declarations.
 
 mod check;
 mod key;

@@ -1,6 +1,6 @@
-//! The six parameter services of a ROS node, and the events from which others hear of changes.
+//! The six parameter services of a ROS node, and the events about changes.
 //!
-//! ros2-client has such services too. They describe nothing, and long replies of theirs do not arrive: a
+//! ros2-client has such services too, but without descriptions, and their long replies do not arrive: a
 //! node that opens these switches those off in its [`super::super::participant::NodeOptions`].
 
 use std::sync::Arc;
@@ -95,7 +95,7 @@ impl ParameterServices {
     }
 }
 
-/// Where others hear of changes.
+/// The publisher of changes.
 struct Events {
     publisher: Publisher<ParameterEvent>,
     clock: NodeClock,
@@ -103,7 +103,7 @@ struct Events {
 }
 
 impl Events {
-    /// Returns the result to answer with, once the others have been told.
+    /// Returns the result to answer with, after publishing the event.
     fn after(
         &self,
         outcome: Result<Vec<WireParameter>, SetParametersResult>,

@@ -1,8 +1,8 @@
-//! What a parameter is: its name, type, default, range and description.
+//! The declaration of a parameter: name, type, default, range and description.
 
 use super::ParameterValue;
 
-/// What a parameter may be.
+/// The allowed values of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// True or false.
@@ -47,14 +47,14 @@ pub enum Kind {
     },
 }
 
-/// What a frame id has to be.
+/// The requirement on a frame id.
 pub(super) const FRAME_ID: &str =
     "be a tf2 frame: not empty, without white space, not beginning with a slash, at most 255 bytes";
-/// What any other text has to be.
+/// The requirement on any other text.
 pub(super) const TEXT: &str = "not be empty";
 
 impl Kind {
-    /// Returns what is allowed, for people.
+    /// Returns the allowed values, for display.
     #[must_use]
     pub fn allowed(&self) -> String {
         match self {
@@ -80,13 +80,13 @@ pub const USE_SIM_TIME: ParameterSpec = ParameterSpec::bool(
 pub struct ParameterSpec {
     /// Its name.
     pub name: &'static str,
-    /// What it may be.
+    /// Its allowed values.
     pub kind: Kind,
-    /// Unit of its values; empty where there is none.
+    /// Unit of its values; empty without one.
     pub unit: &'static str,
     /// Whether it is fixed once the node runs.
     pub read_only: bool,
-    /// What it does, for people.
+    /// Its description.
     pub description: &'static str,
 }
 

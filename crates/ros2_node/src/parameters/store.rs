@@ -1,4 +1,4 @@
-//! What the parameter services answer, without the services: values, descriptions, checked changes.
+//! The logic behind the parameter services: values, descriptions, checked changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,13 +21,13 @@ pub struct SharedParameters {
     changed: smol::channel::Sender<()>,
 }
 
-/// Says why values that are allowed one by one do not go together.
+/// Checks that values which are allowed one by one are consistent.
 type Check = dyn Fn(&Parameters) -> Result<(), String> + Send + Sync;
 
 impl SharedParameters {
     /// Returns shared parameters, and a channel that receives something after a change.
     ///
-    /// `check` says why values do not go together, though each of them is allowed by itself: no change to such values
+    /// `check` returns why values are inconsistent, although each is allowed by itself: no change to such values
     /// is made.
     #[must_use]
     pub fn new(
@@ -146,7 +146,7 @@ impl SharedParameters {
         let accepted = assignments
             .iter()
             .filter_map(|assignment| {
-                // Loaded with a file that holds all values: it stays as it is, and nothing has happened to it.
+                // Reloading an unchanged read-only value raises no event.
                 let is_fixed = changed.spec(&assignment.name)?.read_only;
                 let value = changed.get(&assignment.name).filter(|_| !is_fixed)?;
                 Some(parameter_message(&assignment.name, value))
@@ -154,7 +154,7 @@ impl SharedParameters {
             .collect();
         *parameters = changed;
         drop(parameters);
-        // A full channel already tells what there is to tell.
+        // A full channel already holds the notification.
         let _ = self.changed.try_send(());
         Ok(accepted)
     }

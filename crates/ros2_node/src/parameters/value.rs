@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::text::quoted;
 
-/// A value as it comes from a file, an argument or a service, before any check.
+/// A value from a file, an argument or a service, before any check.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterValue {
     /// True or false.
@@ -83,14 +83,14 @@ pub enum ParameterError {
         /// The value.
         value: f64,
     },
-    /// A word that is not among those allowed.
+    /// A text that is not among those allowed.
     #[error("parameter {name:?} must be one of {}, got {}", allowed.join(", "), quoted(value))]
     NotAllowed {
         /// The parameter.
         name: &'static str,
         /// The value.
         value: String,
-        /// What is allowed.
+        /// The allowed texts.
         allowed: &'static [&'static str],
     },
     /// Text that cannot be used.
@@ -100,10 +100,10 @@ pub enum ParameterError {
         name: &'static str,
         /// The value.
         value: String,
-        /// What it must be.
+        /// The requirement.
         requirement: &'static str,
     },
-    /// A change of what is fixed once the node runs.
+    /// A change of a parameter that is fixed while the node runs.
     #[error("parameter {name:?} is read-only: restart the node to change it")]
     ReadOnly {
         /// The parameter.

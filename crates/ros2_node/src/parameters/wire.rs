@@ -49,7 +49,7 @@ pub const fn type_of(value: &ParameterValue) -> u8 {
     }
 }
 
-/// Returns what tools show of a parameter beside its value.
+/// Returns the description of a parameter for tools.
 pub fn descriptor(
     name: &str,
     value: &ParameterValue,

@@ -44,9 +44,9 @@ pub struct QosParameter {
     pub name: String,
     /// Its value.
     pub value: ParameterValue,
-    /// What it may be.
+    /// Its allowed values.
     pub kind: Kind,
-    /// What it does.
+    /// Its description.
     pub description: &'static str,
 }
 

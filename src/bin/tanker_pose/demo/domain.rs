@@ -6,7 +6,7 @@ use tanker_pose::ros::environment::{DiscoveryRange, Environment};
 
 use super::error::DemoError;
 
-/// Domains whose ports no system hands out to clients, and above those that people choose.
+/// Domains whose ports are not ephemeral, above those that users choose.
 const FIRST: u16 = 50;
 const COUNT: u16 = 50;
 

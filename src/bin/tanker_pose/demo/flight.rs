@@ -54,7 +54,7 @@ pub struct Flight {
     ledger: Ledger,
 }
 
-/// Stamps of probes that came back.
+/// Stamps of answered probes.
 #[derive(Debug, Default)]
 struct ProbeAnswers {
     pose: Option<Stamp>,

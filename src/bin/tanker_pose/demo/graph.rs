@@ -23,7 +23,7 @@ const NODE_NAME: &str = "tanker_demo";
 const FRAME_ID: &str = "camera";
 /// Reliable, so that an answer that is missing is one that the node did not give.
 const ANSWERS: QosProfile = reliable(100);
-/// How often the graph is asked whether somebody else has come.
+/// How often the graph is checked for other endpoints.
 const LOOK_AROUND: Duration = Duration::from_millis(200);
 
 /// The demo in the graph. The fields stand in the order in which they have to be dropped.
@@ -49,7 +49,7 @@ impl Graph {
         })
     }
 
-    /// Lets the flight have what it needs until it ends, or a signal ends it.
+    /// Runs the flight until it ends, or a signal ends it.
     pub async fn run(
         &mut self,
         flight: &mut Flight,
@@ -131,7 +131,7 @@ impl Graph {
     }
 }
 
-/// A camera or an estimator of somebody else's would be disturbed by the demo, and the demo by it.
+/// The demo and another camera or estimator would disturb each other.
 fn check_alone(ros: &RosNode, domain_id: u16) -> Result<(), DemoError> {
     // The graph does not list the asking node's own publishers.
     for (topic, expected) in [

@@ -24,9 +24,9 @@ pub struct Frame {
     pub fault: Option<(Fault, Option<u32>)>,
     /// When its detections were published.
     pub sent: Instant,
-    /// The node's estimate, if it came.
+    /// The node's estimate, if it arrived.
     pub estimate: Option<Estimate>,
-    /// The node's status, if it came.
+    /// The node's status, if it arrived.
     pub verdict: Option<Verdict>,
 }
 
@@ -45,7 +45,7 @@ pub struct Estimate {
     pub latency: Duration,
 }
 
-/// What the node says about a frame.
+/// The node's answer to a frame.
 #[derive(Debug, Clone)]
 pub struct Verdict {
     /// In one word.
@@ -64,7 +64,7 @@ impl Frame {
         self.truth_camera_from_tanker.translation.z
     }
 
-    /// Returns whether all has come that must: a refusal, or a success with its pose.
+    /// Returns whether the answer is complete: a refusal, or a success with its pose.
     pub fn is_answered(&self) -> bool {
         self.verdict
             .as_ref()

@@ -1,4 +1,4 @@
-//! What the demo prints while it flies.
+//! The output of the demo during the flight.
 
 use std::time::Duration;
 
@@ -52,7 +52,7 @@ impl Live {
         }
     }
 
-    /// Says what will happen.
+    /// Prints what will happen.
     pub fn introduce(&self, environment: &Environment, world: Option<String>) {
         self.say(&format!(
             "Simulated approach: {}\n\
@@ -66,7 +66,7 @@ impl Live {
         }
     }
 
-    /// Says that the node was found.
+    /// Prints that the node was found.
     pub fn connected(&self, after: Duration) {
         self.say(&format!(
             "First pose after {:.1} s. All positions are the tanker's in the camera; errors are against the truth.",
@@ -81,13 +81,13 @@ impl Live {
             .set_message(format!("{:.1} m ahead", frame.ahead_m()));
     }
 
-    /// Says that the schedule was moved.
+    /// Prints that the schedule was moved.
     pub fn held_up(&self, late: Duration) {
         let late_s = late.as_secs_f64();
         self.say(&format!("delayed by {late_s:.1} s: continuing from here"));
     }
 
-    /// Says which fault comes now.
+    /// Prints which fault follows.
     pub fn announce(&self, block: Block) {
         self.say(&format!(
             "  INJECTED in {} frames from {}: {}",
@@ -107,7 +107,7 @@ impl Live {
             }
         } else {
             let refusal = code.filter(|code| *code != OutcomeCode::Ok);
-            // Once, until something else happens: thirty lines a second say no more than one.
+            // Once, until something else happens: thirty equal lines a second add nothing.
             if refusal.is_some() && refusal != self.refusal {
                 self.say(&verdict(frame));
             }

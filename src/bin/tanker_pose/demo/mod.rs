@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Inject no faults
     #[arg(long)]
     no_faults: bool,
-    /// Wait at most so long for node and simulation to find each other, s
+    /// Wait at most this long for node and simulation to find each other, s
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = between(0.1, 3600.0))]
     wait_s: f64,
     /// Print the summary as one JSON object, and nothing else
@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     });
     let node_ended = node.stop();
     live.finish();
-    // Why the node ended says more than that it did.
+    // The node's error is more useful than that it ended.
     let end = match flown {
         Err(DemoError::NodeGone) => node_ended.and(Err(DemoError::NodeGone)),
         flown => flown,

@@ -34,7 +34,7 @@ pub struct Block {
     pub length: u32,
 }
 
-/// What is injected when.
+/// The schedule of injected faults.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
     blocks: Vec<Block>,
@@ -44,7 +44,7 @@ pub struct Plan {
 }
 
 impl Fault {
-    /// What it is, and what the node has to do.
+    /// The fault, and the expected answer.
     pub const fn announcement(self) -> &'static str {
         match self {
             Self::GrossError => "one marker moved by 40 px; the node should estimate without it",

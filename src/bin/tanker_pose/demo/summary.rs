@@ -1,4 +1,4 @@
-//! What the flight came to.
+//! The results of the flight.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
@@ -117,7 +117,7 @@ impl Summary {
         self.missing
     }
 
-    /// Prints it for people, or as one JSON object.
+    /// Prints it as text, or as one JSON object.
     pub fn print(&self, json: bool) {
         let text = if json {
             serde_json::to_string(self).unwrap_or_else(|error| error.to_string())

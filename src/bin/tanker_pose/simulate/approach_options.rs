@@ -1,4 +1,4 @@
-//! Which approach, seen by which camera.
+//! Options of the approach and the camera.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use crate::ros_options::between;
 /// The paper's camera, the default.
 pub const PAPER_CAMERA: &str = include_str!("../../../../config/cameras/paper.yaml");
 
-/// What the approach looks like.
+/// The approach.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Approach")]
 pub struct ApproachOptions {
@@ -78,7 +78,7 @@ pub struct ApproachOptions {
 /// Above the options of a world that differs from what is published about it.
 const WORLD: &str = "World";
 
-/// Why there is no such approach.
+/// Why the approach is not possible.
 #[derive(Debug, thiserror::Error)]
 pub enum ApproachError {
     #[error("cannot use the marker map: {0}")]
@@ -96,7 +96,7 @@ pub enum ApproachError {
 }
 
 impl ApproachOptions {
-    /// Returns the approach, and the camera info that goes with it.
+    /// Returns the approach and its camera info.
     ///
     /// The camera info is what the world's camera is drawn about.
     pub fn read(&self) -> Result<(Approach, CameraInfo), ApproachError> {

@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Frame of the camera, x right, y down, z ahead
     #[arg(long, value_name = "NAME", default_value = "camera")]
     frame_id: String,
-    /// Wait at most so long for subscribers of `feature_points` and `camera_info`, s; then go on
+    /// Wait at most this long for subscribers of `feature_points` and `camera_info`, s; then continue
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = between(0.0, 86400.0))]
     wait_s: f64,
     /// Print one JSON object for every frame, and nothing else
@@ -140,7 +140,7 @@ impl Simulation<'_> {
         Ok(())
     }
 
-    /// Waits for subscribers; returns whether to go on.
+    /// Waits for subscribers; returns whether to continue.
     async fn wait(&mut self, ros: &RosNode, signals: &mut Signals) -> bool {
         let patience = Duration::from_secs_f64(self.arguments.wait_s);
         if patience.is_zero() {

@@ -91,7 +91,7 @@ impl Report {
         self.bar.inc(1);
     }
 
-    /// Says how it went.
+    /// Prints the result.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
         let dropped = match self.dropped {

@@ -1,4 +1,4 @@
-//! What stands in for camera and detector: the topics, and their stamps.
+//! The simulated camera and detector: their topics and stamps.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 

@@ -101,7 +101,7 @@ pub struct OutputFrame {
     causes: Option<OutputCauses>,
 }
 
-/// What the error budget's causes did; only with a budget.
+/// Effects of the error budget's causes; only with a budget.
 #[derive(Debug, Serialize)]
 pub struct OutputCauses {
     /// Estimated amplitude of each mode, in its sigmas.
@@ -127,7 +127,7 @@ pub struct OutputNumbers {
     iterations: u16,
 }
 
-/// Returns why a line is no frame, if its beginning shows it: the parser's words would be about its own structures.
+/// Returns why a line is not a frame, if its beginning shows it: the parser's message would be about its own structures.
 pub fn not_an_object(line: &[u8]) -> Option<&'static str> {
     let got = match line.trim_ascii().first() {
         None => "an empty line",

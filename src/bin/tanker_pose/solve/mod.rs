@@ -1,7 +1,7 @@
 //! `tanker_pose solve`: the estimator's face to other languages and to batch work.
 //!
 //! One JSON object a line in, one a line out, in order. A line that cannot be read or solved gives an
-//! output line with its outcome and message, and the next goes on.
+//! output line with its outcome and message, and the next is processed.
 
 mod lines;
 
@@ -32,10 +32,10 @@ const MAX_SKIPPED_BYTES: u64 = 1 << 28;
 pub struct Arguments {
     /// JSON Lines to read; standard input when missing or -
     file: Option<PathBuf>,
-    /// Marker map (paper, fin6 or a path) for points that bring no x, y, z
+    /// Marker map (paper, fin6 or a path) for points without x, y, z
     #[arg(long, value_name = "MAP")]
     marker_map: Option<String>,
-    /// Calibration file, as ROS writes it, for lines that bring no camera
+    /// Calibration file, as ROS writes it, for lines without a camera
     #[arg(long, value_name = "FILE")]
     camera: Option<PathBuf>,
     /// Pixels are those of the rectified image: use p instead of k and d
@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<(), SolveError> {
         _ => Box::new(std::io::stdin().lock()),
     };
     let stdout = std::io::stdout();
-    // A person at the terminal reads the lines themselves; otherwise show that work goes on.
+    // A person at the terminal reads the lines themselves; otherwise show progress.
     let progress = if stdout.is_terminal() {
         ProgressBar::hidden()
     } else {
@@ -288,7 +288,7 @@ impl Solver {
         sight.as_ref()
     }
 
-    /// Where a point sits on the tanker: as it says itself, or as the map says; `None` when neither does.
+    /// The point's position on the tanker, its own or the map's; `None` without either.
     fn marker(&self, point: &InputPoint) -> Result<Option<Point3<f64>>, String> {
         match (point.x, point.y, point.z) {
             (Some(x), Some(y), Some(z)) => {

@@ -35,7 +35,7 @@ impl<M: Message> Ear<M> {
 
     fn attend(&mut self, ros: &mut RosNode, topic: Option<&str>) -> Result<(), EndpointError> {
         let current = self.open.as_ref().map(|(topic, _)| topic.as_str());
-        // A topic that is gone may come again: what is open stays open.
+        // A topic that is gone may return: subscriptions stay open.
         if let Some(topic) = topic
             && current != Some(topic)
         {
@@ -45,7 +45,7 @@ impl<M: Message> Ear<M> {
         Ok(())
     }
 
-    /// Hands over all that has come from one of these processes.
+    /// Delivers all messages from these processes.
     fn drain(&self, from: &BTreeSet<ParticipantId>, mut hear: impl FnMut(M)) {
         let Some((topic, subscription)) = &self.open else {
             return;
@@ -80,7 +80,7 @@ pub struct Ears {
 }
 
 impl Ears {
-    /// Returns ears that listen to nothing yet.
+    /// Returns a set without subscriptions.
     pub fn new(ros: &RosNode) -> Result<Self, NamesError> {
         Ok(Self {
             pose: Ear::new(ros, POSE.name)?,
@@ -90,7 +90,7 @@ impl Ears {
         })
     }
 
-    /// Listens to what the node publishes by now.
+    /// Subscribes to what the node publishes by now.
     pub fn attend(&mut self, ros: &mut RosNode, node: &RunningNode) -> Result<(), EndpointError> {
         let topic = node.topic::<PoseWithCovarianceStamped>(&self.pose.wanted);
         self.pose.attend(ros, topic)?;
@@ -101,7 +101,7 @@ impl Ears {
         self.diagnostics.attend(ros, topic)
     }
 
-    /// Enters what has come from these processes.
+    /// Enters the messages of these processes.
     pub fn drain(&self, from: &BTreeSet<ParticipantId>, heard: &mut Heard, now: Instant) {
         // A pose is published before its status: in this order both are there when the outcome is looked at.
         self.pose

@@ -1,4 +1,4 @@
-//! What a node has said so far, and when.
+//! The latest messages of a node, and their times.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -39,7 +39,7 @@ pub struct Counts {
 /// The latest of each kind.
 #[derive(Debug)]
 pub struct Heard {
-    /// Since when it was listened to.
+    /// Since when messages were received.
     since: Instant,
     pose: Option<(Reading, Instant)>,
     status: Option<(EstimatorStatus, Instant)>,
@@ -50,7 +50,7 @@ pub struct Heard {
 }
 
 impl Heard {
-    /// Returns what was heard of a node that is listened to from now on.
+    /// Returns an empty record that starts now.
     pub const fn new(since: Instant) -> Self {
         Self {
             since,
@@ -63,7 +63,7 @@ impl Heard {
         }
     }
 
-    /// Returns how long it was listened to.
+    /// Returns how long messages have been received.
     pub fn listened(&self, now: Instant) -> Duration {
         now.saturating_duration_since(self.since)
     }

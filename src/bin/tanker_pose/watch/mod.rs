@@ -1,4 +1,4 @@
-//! `tanker_pose watch`: what a running node says, live in a terminal.
+//! `tanker_pose watch`: the state of a running node, live in a terminal.
 
 mod ears;
 mod heard;
@@ -40,7 +40,7 @@ const LINE_EVERY: Duration = Duration::from_secs(1);
 /// How long --once waits unless --seconds is given.
 const ONCE_S: f64 = 10.0;
 
-/// See what a running node says: pose, sigma, points, outcome, fit, track and faults, live.
+/// See the state of a running node: pose, sigma, points, outcome, fit, track and faults, live.
 ///
 /// On a terminal a table is drawn in place; elsewhere a line is printed every second. The node is found by the types
 /// that it publishes, whatever it and its topics are called; --node or --ros-args choose one of several. Positions
