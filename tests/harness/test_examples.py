@@ -24,6 +24,7 @@ from harness.processes import (
     example,
     started,
 )
+from harness.test_bags import PATIENT
 from harness.waiting import wait_until
 
 LANGUAGES = ["python", "rust"]
@@ -165,7 +166,7 @@ def test_the_road_by_bag_is_as_the_documents_say(
     # The truth behind the pixels of the example, which are rounded to 0.1 px.
     assert solved[0]["translation"] == pytest.approx([0.0, -4.5, 15.0], abs=0.01)
 
-    start_node()
+    start_node(*PATIENT)
     peer.spin_until(lambda: peer.sees_node("/tanker_pose"), "the node to be in the graph")
     words = runnable(documented("record_bag.py")).split()
     words[2] = str(tmp_path / words[2])
