@@ -43,7 +43,7 @@ enum Tool {
     #[cfg(feature = "ros")]
     Watch(watch::Arguments),
     /// Solve frames given as JSON Lines, without ROS
-    Solve(solve::Arguments),
+    Solve(Box<solve::Arguments>),
     /// Reproduce the paper's experiments: tables and plots
     Reproduce(reproduce::Arguments),
 }
