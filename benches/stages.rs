@@ -6,8 +6,8 @@
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use nalgebra::{Matrix3, Point3, Vector3};
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use tanker_pose::camera::{Pixel, Ray};
 use tanker_pose::estimation::{
     ErrorBudget, Estimator, EstimatorSettings, Initialisation, Refinement, fixed_point,
@@ -16,7 +16,7 @@ use tanker_pose::estimation::{
 use tanker_pose::geometry::optical_from_body;
 use tanker_pose::refuelling::Region;
 use tanker_pose::simulation::paper_camera;
-use tanker_pose::tracking::{Filter, FilterSettings};
+use tanker_pose::tracking::{Filter, FilterSettings, LastingError};
 
 #[path = "../tests/solver_support/mod.rs"]
 mod solver_support;
@@ -170,6 +170,38 @@ fn filter(criterion: &mut Criterion) {
     group.bench_function("predict", |bencher| {
         bencher.iter(|| filter.predict(black_box(stamp_ns + 10_000_000)));
     });
+
+    // As a budget of survey, flex, calibration and six markers gives them.
+    let errors: Vec<LastingError> = (0..23)
+        .map(|cause| LastingError {
+            cause,
+            shift: Vector6::from_fn(|axis, _| 1e-3 * ((cause + 1) as f64 + axis as f64).sin()),
+            time_constant_s: (cause == 20).then_some(5.0),
+        })
+        .collect();
+    for (name, lasting) in [("alone", [].as_slice()), ("23_lasting", &errors)] {
+        let mut filter = Filter::new(FilterSettings::default()).expect("the defaults are in range");
+        let mut stamp_ns = 0;
+        let mut step = || {
+            stamp_ns += 33_333_333;
+            filter.update_with_lasting(black_box(stamp_ns), &pose, &covariance, lasting)
+        };
+        for _ in 0..100 {
+            step();
+        }
+        group.bench_function(format!("{name}/update"), |bencher| bencher.iter(&mut step));
+        // Overtaken by one frame, and by those of 0.4 s.
+        for later in [1, 12] {
+            let late_ns = stamp_ns - later * 33_333_333 + 1;
+            group.bench_function(format!("{name}/late_by_{later}"), |bencher| {
+                bencher.iter_batched_ref(
+                    || filter.clone(),
+                    |filter| filter.update_with_lasting(late_ns, &pose, &covariance, lasting),
+                    BatchSize::SmallInput,
+                );
+            });
+        }
+    }
 }
 
 fn refuelling(criterion: &mut Criterion) {

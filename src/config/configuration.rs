@@ -5,7 +5,7 @@ use nalgebra::Rotation3;
 use super::attitude::expected_attitude;
 use super::table::Values;
 use super::{CalibrationSigmas, ConsumerConfiguration, Input, Parameters, Settings};
-use crate::estimation::{EstimatorSettings, Initialisation};
+use crate::estimation::{CorrelatedNoise, EstimatorSettings, Initialisation};
 use crate::geometry::optical_from_body;
 use crate::refuelling::ExpectedAttitude;
 use crate::tracking::{CheckedFilterSettings, FilterSettings};
@@ -63,6 +63,7 @@ impl From<&Parameters> for Configuration {
         Self {
             settings: Settings {
                 calibration: calibration_sigmas(&values),
+                correlated_noise: correlated_noise(&values),
                 estimator: estimator_settings(&values),
                 pixel_sigma_px: values.pixel_sigma_px,
                 edge_margin_px: values.edge_margin_px,
@@ -116,6 +117,14 @@ fn calibration_sigmas(values: &Values) -> CalibrationSigmas {
         ],
         jitter_px: values.jitter_px,
     }
+}
+
+fn correlated_noise(values: &Values) -> Option<CorrelatedNoise> {
+    let share = values.correlated_noise_share;
+    (share > 0.0).then(|| {
+        CorrelatedNoise::new(share, values.correlated_noise_time_s)
+            .expect("the table allows only shares and times that pass")
+    })
 }
 
 fn filter_settings(values: &Values) -> CheckedFilterSettings {
@@ -254,6 +263,8 @@ mod tests {
             ("k2_sigma", Double(0.01)),
             ("jitter_px", Double(0.4)),
             ("calibration_budget_file", String("c.yaml".into())),
+            ("correlated_noise_share", Double(0.3)),
+            ("correlated_noise_time_s", Double(2.0)),
             ("acceleration_density_mps2", Double(0.3)),
             ("angular_acceleration_density_dps2", Double(5.0)),
             ("manoeuvre_factor", Double(2.0)),
@@ -271,6 +282,8 @@ mod tests {
         assert!(found.publish_tf && found.publish_markers && found.settings.rectified);
         assert!(found.settings.widen_by_sigma_factor);
         assert_eq!(found.calibration_budget_file.as_deref(), Some("c.yaml"));
+        let lasting = CorrelatedNoise::new(0.3, 2.0).expect("in range");
+        assert_eq!(found.settings.correlated_noise, Some(lasting));
         assert!(found.use_sim_time && found.lifecycle && found.publish_predicted_points);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);

@@ -1,6 +1,6 @@
 //! What the processing of a frame depends on.
 
-use crate::estimation::EstimatorSettings;
+use crate::estimation::{CorrelatedNoise, EstimatorSettings};
 use crate::tracking::CheckedFilterSettings;
 
 /// Everything a frame's processing depends on, checked.
@@ -16,6 +16,8 @@ pub struct Settings {
     pub calibration: CalibrationSigmas,
     /// Sigmas of detections are multiplied by the factor by which residuals scatter more than they say.
     pub widen_by_sigma_factor: bool,
+    /// What part of the noise of detections lasts from frame to frame.
+    pub correlated_noise: Option<CorrelatedNoise>,
     /// Pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
     /// Track settings; `None` disables tracking.

@@ -111,6 +111,11 @@ ros2_node::declare_parameters! {
         calibration_budget_file: Option<String> = optional_text().fixed();
         /// standard deviation of a shift of the whole image, in u and in v, that differs in each frame: vibration
         jitter_px: f64 = double(0.0, [0.0, 100.0]).unit("px");
+        /// part of the variance of each detection's noise that lasts from frame to frame; the track then averages less;
+        /// 0: each frame's noise is its own
+        correlated_noise_share: f64 = double(0.0, [0.0, 1.0]);
+        /// how long that part lasts (time constant)
+        correlated_noise_time_s: f64 = double(1.0, [1e-3, 1e4]).unit("s");
     }
 
     "The track: odometry, and the start of `previous`" {

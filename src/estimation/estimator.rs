@@ -63,7 +63,7 @@ impl Estimator {
     #[must_use]
     pub fn with_budget(self, budget: ErrorBudget) -> Self {
         Self {
-            budget: (!budget.is_empty()).then_some(budget),
+            budget: (!budget.is_empty() || budget.correlated_noise().is_some()).then_some(budget),
             ..self
         }
     }
@@ -72,6 +72,25 @@ impl Estimator {
     #[must_use]
     pub fn budget(&self) -> Option<&ErrorBudget> {
         self.budget.as_ref()
+    }
+
+    /// Returns whether errors beside the noise of detections are stated: a budget, or a prior of the attitude.
+    #[must_use]
+    pub fn has_causes(&self) -> bool {
+        self.budget.is_some() || self.settings.attitude_sigma_rad.is_some()
+    }
+
+    /// Returns whether the causes are those of another estimator, so that an error of its poses may be the same in ours.
+    #[must_use]
+    pub fn has_the_causes_of(&self, other: &Self) -> bool {
+        let prior = |of: &Self| {
+            let nominal = of.settings.nominal_camera_from_tanker;
+            of.settings.attitude_sigma_rad.map(|sigma| (sigma, nominal))
+        };
+        let is_split = |of: &Self| of.settings.refinement == Refinement::MaximumLikelihood;
+        self.budget == other.budget
+            && prior(self) == prior(other)
+            && (!self.has_causes() || is_split(self) == is_split(other))
     }
 
     /// Returns what each cause of the budget did in a frame: its amplitude and its share of the covariance; `None`
@@ -220,7 +239,8 @@ impl Estimator {
         observations: &[Observation],
         previous: Option<&Rotation3<f64>>,
     ) -> Result<Solution, EstimateError> {
-        if self.budget.is_some() || self.settings.attitude_sigma_rad.is_some() {
+        let is_exact = self.budget.as_ref().is_none_or(ErrorBudget::is_empty);
+        if !is_exact || self.settings.attitude_sigma_rad.is_some() {
             return self.estimate_in_doubt(camera, observations, previous);
         }
         let mut room = Room::new();

@@ -39,7 +39,8 @@ use crate::camera::{Camera, Pixel, Ray, UndistortError};
 use crate::geometry::PoseCovariance;
 
 pub use budget::{
-    BudgetError, CalibrationMode, Cause, CauseKind, ErrorBudget, FlexMode, FrameCauses,
+    BudgetError, CalibrationMode, Cause, CauseKind, CorrelatedNoise, CorrelatedNoiseError,
+    ErrorBudget, FlexMode, FrameCauses,
 };
 pub use estimator::Estimator;
 pub(crate) use estimator::PRIOR_SIGMA;

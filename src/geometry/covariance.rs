@@ -115,6 +115,14 @@ pub fn congruent<const M: usize, const N: usize>(
     (full + full.transpose()) * 0.5
 }
 
+/// Returns the symmetric `S` with `S S` a covariance, which may be singular; what is below zero by rounding counts as
+/// zero. Unlike a triangular root it is continuous, so its columns mean the same from frame to frame.
+pub(crate) fn principal_root(covariance: &Matrix6<f64>) -> Matrix6<f64> {
+    let eigen = covariance.symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    eigen.eigenvectors * Matrix6::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,7 @@ mod covariance;
 mod motion;
 mod rotation;
 
+pub(crate) use covariance::principal_root;
 pub use covariance::{PoseCovariance, congruent, pose_error};
 pub(crate) use motion::set;
 pub use motion::{Matrix12, Motion, Twist, Vector12, motion_error};

@@ -85,8 +85,10 @@ status_codes! {
     Predicted = 3 "PREDICTED",
     /// The pose contradicts the track and was not used.
     Gated = 4 "GATED",
-    /// The stamp is that of an earlier frame, or older than the last one used.
+    /// The stamp is that of an earlier frame or too old, or a late frame had nothing to use.
     OutOfOrder = 5 "OUT_OF_ORDER",
+    /// The frame came late and was used at its own time.
+    Inserted = 6 "INSERTED",
 }
 
 #[cfg(test)]

@@ -20,9 +20,12 @@ impl FrameTrack {
     #[must_use]
     pub fn code(&self) -> TrackCode {
         match self.outcome {
-            Some(TrackOutcome::Duplicate { .. } | TrackOutcome::Late { .. }) => {
-                TrackCode::OutOfOrder
-            }
+            Some(TrackOutcome::Inserted { was_used: true, .. }) => TrackCode::Inserted,
+            Some(
+                TrackOutcome::Duplicate { .. }
+                | TrackOutcome::Inserted { .. }
+                | TrackOutcome::Late { .. },
+            ) => TrackCode::OutOfOrder,
             Some(TrackOutcome::Gated { .. }) => TrackCode::Gated,
             Some(TrackOutcome::Updated { .. } | TrackOutcome::Acquired) => TrackCode::Updated,
             Some(_) if self.motion.is_some() => TrackCode::Predicted,

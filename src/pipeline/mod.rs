@@ -14,6 +14,7 @@ mod code;
 mod edge;
 mod frame;
 mod frame_track;
+mod lasting;
 mod next_image;
 mod outcome;
 mod predict;
@@ -44,6 +45,7 @@ pub use code::{OutcomeCode, TrackCode};
 pub use edge::{ImageEdges, LeftOut};
 pub use frame::{Detection, DetectionFrame};
 pub use frame_track::FrameTrack;
+pub use lasting::FrameErrors;
 pub use next_image::NextImage;
 pub use outcome::FrameOutcome;
 pub use predict::PredictedPoint;
@@ -143,10 +145,12 @@ impl Pipeline {
         }
     }
 
-    /// Replaces the settings from the next frame on; camera, last attitude and track stay.
+    /// Replaces the settings from the next frame on; camera, last attitude and track stay. With another error budget
+    /// the track begins anew: it has carried errors of the old one.
     pub fn set_settings(&mut self, settings: Settings) {
         let is_other = settings.estimator != self.settings.estimator
             || settings.calibration != self.settings.calibration
+            || settings.correlated_noise != self.settings.correlated_noise
             || settings.rectified != self.settings.rectified;
         if settings.rectified != self.settings.rectified {
             // The rectified camera looks elsewhere.
@@ -159,14 +163,24 @@ impl Pipeline {
                     LatchedCamera::new(info, frame_id, settings.rectified, budget)
                 });
         }
-        if is_other {
-            self.estimator = estimator(&settings, &self.map, self.camera.as_ref());
-        }
         if !settings.widen_by_sigma_factor {
             self.widening.forget();
         }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
+        if is_other {
+            self.renew_estimator();
+        }
+    }
+
+    /// Makes the estimator of settings and camera. With other lasting errors the track begins anew: it carries the old
+    /// ones.
+    fn renew_estimator(&mut self) {
+        let renewed = estimator(&self.settings, &self.map, self.camera.as_ref());
+        if !renewed.has_the_causes_of(&self.estimator) {
+            self.tracker.reset();
+        }
+        self.estimator = renewed;
     }
 
     /// Forgets the last attitude, the track, and what was wrong with markers and sigmas: the next frame is the first.
@@ -206,9 +220,14 @@ impl Pipeline {
             self.calibration.as_ref(),
         );
         let result = latched.camera.as_ref().map(|_| true).map_err(Clone::clone);
-        let latched = self.camera.insert(latched);
+        self.camera = Some(latched);
         if self.calibration.is_some() {
-            self.estimator = estimator(&self.settings, &self.map, Some(latched));
+            self.renew_estimator();
+        }
+        let budget = self.estimator.budget();
+        if budget.is_some_and(|budget| !budget.calibration().is_empty()) {
+            // The errors of another calibration are other ones.
+            self.tracker.reset();
         }
         result
     }
@@ -259,7 +278,8 @@ impl Pipeline {
             self.watch_scatter(frame.stamp, &outcome);
         }
         let mut outcome = self.suspects.judge(outcome);
-        self.tracker.follow(frame.stamp, &mut outcome);
+        let has_causes = self.estimator.has_causes();
+        self.tracker.follow(frame.stamp, &mut outcome, has_causes);
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {
             let rotation = solution.camera_from_tanker.rotation.to_rotation_matrix();
@@ -357,7 +377,8 @@ impl Pipeline {
 
 fn estimator(settings: &Settings, map: &MarkerMap, camera: Option<&LatchedCamera>) -> Estimator {
     let of_file = camera.map_or(&[][..], |latched| &latched.modes);
-    let budget = error_budget(map.budget(), &settings.calibration, of_file);
+    let budget = error_budget(map.budget(), &settings.calibration, of_file)
+        .with_correlated_noise(settings.correlated_noise);
     Estimator::new(settings.estimator.clone()).with_budget(budget)
 }
 
@@ -372,9 +393,8 @@ pub fn solve(
     let asked = estimator.settings().initialisation;
     match estimator.estimate(camera, observations, previous) {
         Ok(solution) => {
-            let has_causes =
-                estimator.budget().is_some() || estimator.settings().attitude_sigma_rad.is_some();
-            let causes = has_causes
+            let causes = estimator
+                .has_causes()
                 .then(|| estimator.causes(camera, observations, &solution))
                 .flatten();
             let settings = estimator.settings();

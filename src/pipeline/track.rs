@@ -1,11 +1,12 @@
 //! What a frame does to the track, and what the track does for a frame.
 //!
 //! The track never touches a single frame's pose. With `initialisation: previous` the iteration starts from
-//! its prediction, and where wrong detections have to be found the same prediction says what is plausible.
+//! its prediction, and where wrong detections have to be found the same prediction says what is plausible. With an error
+//! budget the track takes only noise and jitter as independent from frame to frame.
 
 use nalgebra::Rotation3;
 
-use super::{FrameOutcome, Refusal, Stamp};
+use super::{FrameErrors, FrameOutcome, Refusal, Stamp};
 use crate::tracking::{CheckedFilterSettings, Filter, LastMotion, TrackOutcome};
 
 /// The filter between the frames, or none.
@@ -46,8 +47,8 @@ impl Tracker {
         self.0.as_ref()?.last_motion()
     }
 
-    /// Tells the filter of a frame, and enters what came of it in the outcome.
-    pub(super) fn follow(&mut self, stamp: Stamp, frame: &mut FrameOutcome) {
+    /// Gives the filter a frame, and enters what came of it in the outcome.
+    pub(super) fn follow(&mut self, stamp: Stamp, frame: &mut FrameOutcome, has_causes: bool) {
         let Some(filter) = &mut self.0 else {
             return;
         };
@@ -58,13 +59,21 @@ impl Tracker {
         let stamp_ns = stamp.nanoseconds();
         let outcome = match &frame.result {
             Ok(solution) => {
-                filter.update(stamp_ns, &solution.camera_from_tanker, &solution.covariance)
+                let errors = FrameErrors::new(solution, frame.causes.as_ref(), has_causes);
+                filter.update_with_lasting(
+                    stamp_ns,
+                    &solution.camera_from_tanker,
+                    &errors.noise,
+                    &errors.lasting,
+                )
             }
-            _ => filter.miss(stamp_ns),
+            Err(_) => filter.miss(stamp_ns),
         };
         frame.track.outcome = Some(outcome);
         frame.track.motion = match outcome {
-            TrackOutcome::Duplicate { .. } | TrackOutcome::Late { .. } => None,
+            TrackOutcome::Duplicate { .. }
+            | TrackOutcome::Inserted { .. }
+            | TrackOutcome::Late { .. } => None,
             _ => filter.predict(stamp_ns).ok(),
         };
     }

@@ -78,8 +78,14 @@ impl Widening {
         marker_in_tanker: impl Fn(u32) -> Option<Point3<f64>>,
     ) {
         let latest_s = self.earlier.back().map(|(time_s, _)| *time_s);
-        if latest_s.is_some_and(|latest_s| now_s < latest_s) {
-            // A recording that restarts, or a late image.
+        if let Some(latest_s) = latest_s
+            && now_s < latest_s
+        {
+            if latest_s - now_s < LAG_S {
+                // A late image: those in order are enough.
+                return;
+            }
+            // A recording that restarts.
             self.earlier.clear();
         }
         while (self.earlier.get(1)).is_some_and(|(time_s, _)| now_s - time_s >= LAG_S) {

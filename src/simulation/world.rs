@@ -23,10 +23,16 @@ pub struct World {
     /// Amplitude of each flex mode in its sigmas.
     flex_sigmas: Vec<f64>,
     /// Phases of the waves that move each flex mode, rad.
-    phases: Vec<[f64; WAVES_PER_CONSTANT.len()]>,
+    phases: Vec<Phases>,
+    /// What lasts of the noise of each marker's u and v, in its sigmas, and phases of the waves that move it; empty
+    /// where all noise is each frame's own.
+    lasting_noise: Vec<[(f64, Phases); 2]>,
 }
 
-/// Periods of the waves that move a flex mode, in its time constants; without a common multiple.
+/// Of the waves that move one number, rad.
+type Phases = [f64; WAVES_PER_CONSTANT.len()];
+
+/// Periods of the waves that move one number, in its time constants; without a common multiple.
 const WAVES_PER_CONSTANT: [f64; 4] = [3.1, 4.7, 7.3, 11.9];
 
 impl World {
@@ -56,6 +62,12 @@ impl World {
             .iter()
             .map(|_| WAVES_PER_CONSTANT.map(|_| random.random_range(0.0..TAU)))
             .collect();
+        let mut lasting = || {
+            let phases = WAVES_PER_CONSTANT.map(|_| random.random_range(0.0..TAU));
+            (normal(random), phases)
+        };
+        let noisy = budget.correlated_noise().map_or(0, |_| markers.len());
+        let lasting_noise = (0..noisy).map(|_| [lasting(), lasting()]).collect();
         Self {
             camera: camera.with_change(&change),
             believed: markers.to_vec(),
@@ -63,24 +75,25 @@ impl World {
             budget: budget.clone(),
             flex_sigmas,
             phases,
+            lasting_noise,
         }
     }
 
-    /// Returns the world at a time: flex modes with a time constant move as a sum of waves of one sigma altogether, the
-    /// same whatever was asked before.
+    /// Returns the world at a time: flex modes with a time constant, and noise that lasts, move as a sum of waves of one
+    /// sigma altogether, the same whatever was asked before.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut world = self.clone();
         let modes = self.budget.flex().iter().zip(&self.phases);
         for ((mode, phases), amplitude) in modes.zip(&mut world.flex_sigmas) {
-            let Some(time_constant_s) = mode.time_constant_s else {
-                continue;
-            };
-            let waves = WAVES_PER_CONSTANT.iter().zip(phases);
-            let sum: f64 = waves
-                .map(|(period, phase)| (TAU * time_s / (period * time_constant_s) + phase).sin())
-                .sum();
-            *amplitude = sum * (2.0 / WAVES_PER_CONSTANT.len() as f64).sqrt();
+            if let Some(time_constant_s) = mode.time_constant_s {
+                *amplitude = waves(time_s / time_constant_s, phases);
+            }
+        }
+        if let Some(noise) = self.budget.correlated_noise() {
+            for (amplitude, phases) in world.lasting_noise.iter_mut().flatten() {
+                *amplitude = waves(time_s / noise.time_constant_s(), phases);
+            }
         }
         world
     }
@@ -104,13 +117,21 @@ impl World {
         }
     }
 
-    /// Lets time pass: flex modes with a time constant wander, with that constant and one sigma (a Gauss–Markov process
-    /// of first order).
+    /// Lets time pass: flex modes with a time constant, and noise that lasts, wander with that constant and one sigma (a
+    /// Gauss–Markov process of first order).
     pub fn advance(&mut self, seconds: f64, random: &mut impl Rng) {
+        let mut wander = |amplitude: &mut f64, time_constant_s: f64| {
+            let kept = (-seconds / time_constant_s).exp();
+            *amplitude = kept * *amplitude + (1.0 - kept * kept).sqrt() * normal(random);
+        };
         for (amplitude, mode) in self.flex_sigmas.iter_mut().zip(self.budget.flex()) {
             if let Some(time_constant_s) = mode.time_constant_s {
-                let kept = (-seconds / time_constant_s).exp();
-                *amplitude = kept * *amplitude + (1.0 - kept * kept).sqrt() * normal(random);
+                wander(amplitude, time_constant_s);
+            }
+        }
+        if let Some(noise) = self.budget.correlated_noise() {
+            for (amplitude, _) in self.lasting_noise.iter_mut().flatten() {
+                wander(amplitude, noise.time_constant_s());
             }
         }
     }
@@ -124,11 +145,20 @@ impl World {
         random: &mut impl Rng,
     ) -> Vec<Observation> {
         let jitter = [(); 2].map(|()| self.budget.jitter_px() * normal(random));
+        let share = self
+            .budget
+            .correlated_noise()
+            .map_or(0.0, |noise| noise.share());
         self.believed
             .iter()
             .zip(&self.surveyed)
-            .filter_map(|(marker, surveyed)| {
-                let noise = [(); 2].map(|()| sigma_px * normal(random));
+            .enumerate()
+            .filter_map(|(index, (marker, surveyed))| {
+                let lasting = self.lasting_noise.get(index);
+                let noise = [0, 1].map(|axis| {
+                    let lasting = lasting.map_or(0.0, |noise| share.sqrt() * noise[axis].0);
+                    sigma_px * (lasting + (1.0 - share).sqrt() * normal(random))
+                });
                 let q = camera_from_tanker * (surveyed + self.flex_of(marker.id));
                 if q.z <= 0.0 {
                     return None;
@@ -160,6 +190,15 @@ impl World {
             })
             .sum()
     }
+}
+
+/// Returns a sum of waves of unit variance at a time in time constants.
+fn waves(time: f64, phases: &Phases) -> f64 {
+    let waves = WAVES_PER_CONSTANT.iter().zip(phases);
+    let sum: f64 = waves
+        .map(|(period, phase)| (TAU * time / period + phase).sin())
+        .sum();
+    sum * (2.0 / WAVES_PER_CONSTANT.len() as f64).sqrt()
 }
 
 fn normal(random: &mut impl Rng) -> f64 {

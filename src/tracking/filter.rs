@@ -1,56 +1,34 @@
 //! The track: when it begins, what it believes, when it ends.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix6, Vector3};
 
+use super::belief::{Belief, State, StateMotion};
+use super::history::{Entry, Frame, History, Measured, Place};
 use super::lag::{Lag, MEMORY_FRAMES};
-use super::model::{Innovation, Noise, add_noise, predict};
-use super::settings::Checked;
-use super::symmetric6::{Factor, rows};
-use super::{
-    CheckedFilterSettings, FilterSettings, FilterSettingsError, MeasurementError, PredictError,
-    StartReason, TrackOutcome,
+use super::lasting::{Lasting, LastingError};
+use super::model::{
+    Difference, Innovation, Noise, Transition, add_noise, advance, predict, symmetric,
 };
+use super::outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};
+use super::settings::{Checked, CheckedFilterSettings, FilterSettings, FilterSettingsError};
+use super::symmetric6::{Factor, rows};
+use super::track::{Track, seconds};
 use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
-/// The motion of the tanker in the camera at the time of one image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Track {
-    /// Time of the image, ns.
-    pub stamp_ns: i64,
-    /// `camera_from_tanker` with velocity, rate and covariance: `b` is the camera, `a` the tanker.
-    pub motion: Motion,
-}
-
-/// A track, or a candidate for one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct State {
-    track: Track,
-    consistent_frames: u32,
-    /// The latest stamp of any frame, accepted or not.
-    seen_ns: i64,
-    lag: Lag,
-}
-
-/// Where a stamp stands to the last accepted one.
-enum Place {
-    /// After it, within the gap.
-    Next { gap_s: f64 },
-    /// The frame says nothing new.
-    Unusable(TrackOutcome),
-    /// On another time line: a candidate begins there.
-    Elsewhere(StartReason),
-}
-
-/// Turns poses of single frames into a track. It allocates nothing and reads no clock.
+/// Turns poses of single frames into a track. It reads no clock, and allocates only until it has room for the frames of
+/// half a second.
 ///
-/// A frame that comes later than one with a younger stamp is not used: nothing is computed twice.
+/// A frame that comes late is taken at its own time, if that is less than 0.5 s behind the last accepted frame and no
+/// more than sixty frames are kept since: frames after it are taken again. The track is then the same, bit for bit, as if all frames
+/// had come in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
     settings: FilterSettings,
     checked: Checked,
-    state: Option<State>,
-    /// What the frames say that the gate refuses, one after the other: a track of their own, if they agree.
-    challenger: Option<State>,
+    belief: Belief,
+    history: History,
+    /// Room for a prediction.
+    scratch: Lasting,
 }
 
 /// Why a pose does not correct a track or candidate.
@@ -59,21 +37,15 @@ enum Refused {
     LostPrecision,
 }
 
-/// A pose with its time, the floor added to its covariance.
-struct Measured<'a> {
-    stamp_ns: i64,
-    camera_from_tanker: &'a Isometry3<f64>,
-    covariance: PoseCovariance,
-}
-
 impl From<CheckedFilterSettings> for Filter {
     /// Returns a filter without a track.
     fn from(settings: CheckedFilterSettings) -> Self {
         Self {
             checked: settings.checked,
             settings: *settings.settings(),
-            state: None,
-            challenger: None,
+            belief: Belief::default(),
+            history: History::default(),
+            scratch: Lasting::default(),
         }
     }
 }
@@ -93,35 +65,23 @@ impl Filter {
         &self.settings
     }
 
-    /// Takes other settings from the next frame on; track and candidate stay.
+    /// Takes other settings from the next frame on; track and candidate stay. Frames from before cannot come any more.
     pub fn set_settings(&mut self, settings: CheckedFilterSettings) {
+        self.history.close(self.accepted_ns());
         self.checked = settings.checked;
         self.settings = *settings.settings();
     }
 
     /// Forgets track and candidate; the next pose is the first.
     pub fn reset(&mut self) {
-        self.state = None;
-        self.challenger = None;
+        self.belief = Belief::default();
+        self.history.clear();
     }
 
     /// Returns the track at the last accepted frame; `None` while it is not confirmed.
     #[must_use]
-    pub fn track(&self) -> Option<&Track> {
-        self.confirmed().map(|state| &state.track)
-    }
-
-    /// Returns whether the last frames moved more than the quiet noise explains, so that the larger one holds.
-    #[must_use]
-    pub fn is_manoeuvring(&self) -> bool {
-        self.confirmed()
-            .is_some_and(|state| state.lag.is_manoeuvring())
-    }
-
-    /// Returns the largest squared innovation that the gate accepts.
-    #[must_use]
-    pub fn gate_limit(&self) -> f64 {
-        self.checked.gate
+    pub fn track(&self) -> Option<Track> {
+        self.confirmed().map(State::track)
     }
 
     /// Returns the motion expected at a stamp, with its covariance: a start for the next estimate.
@@ -130,7 +90,7 @@ impl Filter {
     /// [`PredictError`]: no track, a stamp before it, or one more than `max_gap_s` after it.
     pub fn predict(&self, stamp_ns: i64) -> Result<Motion, PredictError> {
         let state = self.confirmed().ok_or(PredictError::NoTrack)?;
-        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
+        let gap_s = seconds(stamp_ns, state.motion.stamp_ns);
         if gap_s < 0.0 {
             return Err(PredictError::BeforeTrack { by_s: -gap_s });
         }
@@ -138,27 +98,8 @@ impl Filter {
         if gap_s > limit_s {
             return Err(PredictError::BeyondGap { gap_s, limit_s });
         }
-        Ok(predict(&state.track.motion, gap_s, self.noise(&state.lag)))
-    }
-
-    /// Returns how far a pose is from what the track expects at its stamp: the squared innovation over
-    /// its covariance, chi-squared with 6 degrees of freedom, to be held against [`Self::gate_limit`].
-    ///
-    /// Of two poses that fit an image alike, the one that the motion so far contradicts is found by this.
-    /// It changes nothing.
-    ///
-    /// # Errors
-    /// As [`Self::predict`].
-    pub fn innovation_squared(
-        &self,
-        stamp_ns: i64,
-        camera_from_tanker: &Isometry3<f64>,
-        covariance: &PoseCovariance,
-    ) -> Result<f64, PredictError> {
-        let predicted = self.predict(stamp_ns)?;
-        let noise = self.with_floor(covariance);
-        Ok(Innovation::new(&predicted, camera_from_tanker, &noise)
-            .map_or(f64::INFINITY, |innovation| innovation.squared))
+        let noise = self.checked.noise(&state.motion.lag);
+        Ok(predict(&state.track().motion, gap_s, noise))
     }
 
     /// Takes the pose of one frame and returns what became of it.
@@ -176,35 +117,140 @@ impl Filter {
         camera_from_tanker: &Isometry3<f64>,
         covariance: &PoseCovariance,
     ) -> TrackOutcome {
-        if let Err(error) = check(camera_from_tanker, covariance) {
+        self.update_with_lasting(stamp_ns, camera_from_tanker, covariance, &[])
+    }
+
+    /// Takes the pose of one frame, whose error has parts in common with those of other frames.
+    ///
+    /// # Inputs
+    /// * `stamp_ns`, `camera_from_tanker`: as for [`Self::update`].
+    /// * `noise`: covariance of the part of the error that is this frame's own.
+    /// * `lasting`: the parts that other frames share. The first 58 of a track are carried one by one, others together
+    ///   as constant errors of the pose: those with a time constant and the largest come first.
+    pub fn update_with_lasting(
+        &mut self,
+        stamp_ns: i64,
+        camera_from_tanker: &Isometry3<f64>,
+        noise: &PoseCovariance,
+        lasting: &[LastingError],
+    ) -> TrackOutcome {
+        if let Err(error) = check(camera_from_tanker, noise, lasting) {
             return TrackOutcome::Invalid(error);
         }
         let measured = Measured {
-            stamp_ns,
-            camera_from_tanker,
-            covariance: self.with_floor(covariance),
+            camera_from_tanker: *camera_from_tanker,
+            noise: self.with_floor(noise),
         };
-        let Some(mut state) = self.state else {
-            return self.start(&measured, StartReason::First);
+        self.take(stamp_ns, Some(&measured), lasting)
+    }
+
+    /// Takes the stamp of a frame that gave no pose, and returns whether the track outlives it.
+    pub fn miss(&mut self, stamp_ns: i64) -> TrackOutcome {
+        self.take(stamp_ns, None, &[])
+    }
+
+    /// Puts a frame among the others, by its stamp.
+    fn take(
+        &mut self,
+        stamp_ns: i64,
+        measured: Option<&Measured>,
+        lasting: &[LastingError],
+    ) -> TrackOutcome {
+        let mut accepted_ns = self.accepted_ns();
+        let mut late_by_s = None;
+        let at = match self.history.place(stamp_ns, accepted_ns) {
+            Place::Newest => self.history.len(),
+            Place::Before {
+                at,
+                late_by_s: by_s,
+            } => {
+                late_by_s = Some(by_s);
+                at
+            }
+            Place::Seen => return TrackOutcome::Duplicate { stamp_ns },
+            Place::TooOld { late_by_s }
+                if accepted_ns.is_some() && late_by_s <= self.checked.max_gap_s =>
+            {
+                return TrackOutcome::Late { late_by_s };
+            }
+            // The source of the stamps has begun anew, or nothing is believed: what was before is of another time.
+            Place::TooOld { .. } => {
+                self.history.clear();
+                accepted_ns = None;
+                0
+            }
         };
-        let gap_s = match self.place(&state, stamp_ns) {
-            Place::Next { gap_s } => gap_s,
-            Place::Unusable(outcome) => return outcome,
-            Place::Elsewhere(reason) => return self.start(&measured, reason),
+        let at = self.history.insert(at, stamp_ns, accepted_ns);
+        if let Some(entry) = self.history.entry(at) {
+            entry.frame.measured = measured.copied();
+            entry.frame.lasting.extend_from_slice(lasting);
+        }
+        // Out, so that its frames can be read while the belief changes.
+        let mut history = std::mem::take(&mut self.history);
+        if let Some(next) = history.entry(at + 1) {
+            self.belief.clone_from(&next.before);
+        }
+        let mut outcome = None;
+        for at in at..history.len() {
+            if let Some(Entry { frame, before }) = history.entry(at) {
+                before.clone_from(&self.belief);
+                let of_frame = self.follow(frame);
+                outcome.get_or_insert(of_frame);
+            }
+        }
+        self.history = history;
+        let outcome = outcome.unwrap_or(TrackOutcome::Idle);
+        let Some(late_by_s) = late_by_s else {
+            return outcome;
         };
-        state.seen_ns = state.seen_ns.max(stamp_ns);
-        let is_confirmed = state.consistent_frames >= self.checked.confirm_frames;
+        TrackOutcome::Inserted {
+            late_by_s,
+            was_used: measured.is_some() && !matches!(outcome, TrackOutcome::Gated { .. }),
+        }
+    }
+
+    /// Returns the stamp of the last accepted frame, of a track or a candidate.
+    fn accepted_ns(&self) -> Option<i64> {
+        Some(self.belief.state.as_ref()?.motion.stamp_ns)
+    }
+
+    /// Goes on by one frame, in the order of stamps.
+    fn follow(&mut self, frame: &Frame) -> TrackOutcome {
+        let stamp_ns = frame.stamp_ns;
+        let Some(state) = &mut self.belief.state else {
+            return match &frame.measured {
+                Some(measured) => self.start(frame, measured, StartReason::First),
+                None => TrackOutcome::Idle,
+            };
+        };
+        let gap_s = seconds(stamp_ns, state.motion.stamp_ns);
+        let restart = if gap_s > self.checked.max_gap_s {
+            Some(StartReason::Gap { gap_s })
+        } else if gap_s <= 0.0 {
+            Some(StartReason::StampsWentBack { by_s: -gap_s })
+        } else {
+            None
+        };
+        let Some(measured) = &frame.measured else {
+            if restart.is_some() {
+                self.belief = Belief::default();
+                return TrackOutcome::Dropped { gap_s };
+            }
+            return TrackOutcome::Coasting { gap_s };
+        };
+        if let Some(reason) = restart {
+            return self.start(frame, measured, reason);
+        }
+        let needed = self.checked.confirm_frames;
         let limit = self.checked.gate;
-        match self.step(&state, gap_s, &measured) {
-            Err(Refused::LostPrecision) => self.start(&measured, StartReason::LostPrecision),
-            Err(Refused::Contradicts { innovation_squared }) if is_confirmed => {
-                self.state = Some(state);
-                self.challenge(&measured);
-                if self
-                    .challenger
-                    .is_some_and(|rival| self.is_confirmed(&rival))
-                {
-                    self.state = self.challenger.take();
+        let was_confirmed = state.motion.consistent_frames >= needed;
+        match step(&self.checked, &mut self.scratch, state, frame, measured) {
+            Err(Refused::LostPrecision) => self.start(frame, measured, StartReason::LostPrecision),
+            Err(Refused::Contradicts { innovation_squared }) if was_confirmed => {
+                self.challenge(frame, measured);
+                let rival = self.belief.challenger.as_ref();
+                if rival.is_some_and(|rival| rival.motion.consistent_frames >= needed) {
+                    self.belief.state = self.belief.challenger.take();
                     return TrackOutcome::Acquired;
                 }
                 TrackOutcome::Gated {
@@ -217,19 +263,18 @@ impl Filter {
                     innovation_squared,
                     limit,
                 };
-                self.start(&measured, reason)
+                self.start(frame, measured, reason)
             }
-            Ok((state, innovation_squared)) => {
-                self.state = Some(state);
-                self.challenger = None;
-                let needed = self.checked.confirm_frames;
-                if is_confirmed {
+            Ok(innovation_squared) => {
+                let consistent_frames = state.motion.consistent_frames;
+                self.belief.challenger = None;
+                if was_confirmed {
                     TrackOutcome::Updated { innovation_squared }
-                } else if self.is_confirmed(&state) {
+                } else if consistent_frames >= needed {
                     TrackOutcome::Acquired
                 } else {
                     TrackOutcome::Confirming {
-                        consistent_frames: state.consistent_frames,
+                        consistent_frames,
                         needed,
                     }
                 }
@@ -237,157 +282,44 @@ impl Filter {
         }
     }
 
-    /// Returns a track or candidate corrected by a pose `gap_s` after its last frame, and the squared innovation.
-    fn step(
-        &self,
-        state: &State,
-        gap_s: f64,
-        measured: &Measured,
-    ) -> Result<(State, f64), Refused> {
-        let mut predicted = predict(&state.track.motion, gap_s, self.noise(&state.lag));
-        let innovate = |from: &Motion| {
-            Innovation::new(from, measured.camera_from_tanker, &measured.covariance)
-        };
-        let mut innovation = innovate(&predicted).ok_or(Refused::LostPrecision)?;
-        let innovation_squared = innovation.squared;
-        if innovation_squared > self.checked.gate {
-            return Err(Refused::Contradicts { innovation_squared });
-        }
-        let lag = state
-            .lag
-            .with(&innovation.whitened, gap_s, self.checked.lag_limit);
-        if lag.is_manoeuvring() && !state.lag.is_manoeuvring() {
-            // It has lagged since it began to lean, so the larger noise is owed for that time too.
-            add_noise(
-                &mut predicted,
-                MEMORY_FRAMES * gap_s,
-                &self.checked.manoeuvre_noise,
-            );
-            innovation = innovate(&predicted).ok_or(Refused::LostPrecision)?;
-        }
-        let motion = innovation
-            .corrected(&predicted)
-            .ok_or(Refused::LostPrecision)?;
-        let corrected = State {
-            track: Track {
-                stamp_ns: measured.stamp_ns,
-                motion,
-            },
-            consistent_frames: state.consistent_frames.saturating_add(1),
-            lag,
-            ..*state
-        };
-        Ok((corrected, innovation_squared))
-    }
-
     /// Takes a pose that the gate has refused for the track that such poses may make.
-    fn challenge(&mut self, measured: &Measured) {
-        let going_on = self.challenger.and_then(|rival| {
-            let Place::Next { gap_s } = self.place(&rival, measured.stamp_ns) else {
-                return None;
-            };
-            let (state, _) = self.step(&rival, gap_s, measured).ok()?;
-            Some(State {
-                seen_ns: measured.stamp_ns,
-                ..state
-            })
-        });
-        self.challenger = Some(going_on.unwrap_or_else(|| self.candidate(measured)));
-    }
-
-    fn place(&self, state: &State, stamp_ns: i64) -> Place {
-        if stamp_ns == state.seen_ns || stamp_ns == state.track.stamp_ns {
-            return Place::Unusable(TrackOutcome::Duplicate { stamp_ns });
-        }
-        let gap_s = seconds(stamp_ns, state.track.stamp_ns);
-        if gap_s > self.checked.max_gap_s {
-            Place::Elsewhere(StartReason::Gap { gap_s })
-        } else if gap_s < -self.checked.max_gap_s {
-            Place::Elsewhere(StartReason::StampsWentBack { by_s: -gap_s })
-        } else if gap_s < 0.0 {
-            Place::Unusable(TrackOutcome::Late { late_by_s: -gap_s })
-        } else {
-            Place::Next { gap_s }
-        }
-    }
-
-    /// Tells the filter of a frame that gave no pose, and returns whether the track outlives it.
-    pub fn miss(&mut self, stamp_ns: i64) -> TrackOutcome {
-        let Some(state) = self.state else {
-            return TrackOutcome::Idle;
-        };
-        let outcome = match self.place(&state, stamp_ns) {
-            Place::Unusable(outcome) => return outcome,
-            Place::Elsewhere(_) => {
-                self.reset();
-                return TrackOutcome::Dropped {
-                    gap_s: seconds(stamp_ns, state.track.stamp_ns),
-                };
+    fn challenge(&mut self, frame: &Frame, measured: &Measured) {
+        if let Some(rival) = &mut self.belief.challenger {
+            let gap_s = seconds(frame.stamp_ns, rival.motion.stamp_ns);
+            let is_next = gap_s > 0.0 && gap_s <= self.checked.max_gap_s;
+            if is_next && step(&self.checked, &mut self.scratch, rival, frame, measured).is_ok() {
+                return;
             }
-            Place::Next { gap_s } => TrackOutcome::Coasting { gap_s },
-        };
-        self.state = Some(State {
-            seen_ns: state.seen_ns.max(stamp_ns),
-            ..state
-        });
-        outcome
+        }
+        self.checked
+            .begin(&mut self.belief.challenger, frame, measured);
     }
 
     /// Returns track or candidate, the noise that drives it, and whether it is confirmed.
     pub(super) fn believed(&self) -> Option<(Track, Noise, bool)> {
-        let state = self.state.as_ref()?;
+        let state = self.belief.state.as_ref()?;
         Some((
-            state.track,
-            *self.noise(&state.lag),
-            self.is_confirmed(state),
+            state.track(),
+            *self.checked.noise(&state.motion.lag),
+            self.confirmed().is_some(),
         ))
     }
 
+    /// Returns a column of the covariance of motion and lasting causes.
+    #[cfg(test)]
+    pub(super) fn lasting_column(&self, at: usize) -> Option<crate::geometry::Vector12> {
+        self.belief.state.as_ref()?.lasting.column(at)
+    }
+
     fn confirmed(&self) -> Option<&State> {
-        self.state.as_ref().filter(|state| self.is_confirmed(state))
+        let state = self.belief.state.as_ref()?;
+        (state.motion.consistent_frames >= self.checked.confirm_frames).then_some(state)
     }
 
-    fn is_confirmed(&self, state: &State) -> bool {
-        state.consistent_frames >= self.checked.confirm_frames
-    }
-
-    fn start(&mut self, measured: &Measured, reason: StartReason) -> TrackOutcome {
-        self.state = Some(self.candidate(measured));
-        self.challenger = None;
+    fn start(&mut self, frame: &Frame, measured: &Measured, reason: StartReason) -> TrackOutcome {
+        self.checked.begin(&mut self.belief.state, frame, measured);
+        self.belief.challenger = None;
         TrackOutcome::Started(reason)
-    }
-
-    /// Returns the candidate that begins with this frame.
-    fn candidate(&self, measured: &Measured) -> State {
-        let mut full = Matrix12::zeros();
-        full.fixed_view_mut::<6, 6>(0, 0)
-            .copy_from(&measured.covariance.0);
-        for axis in 0..3 {
-            full[(6 + axis, 6 + axis)] = self.checked.initial_speed_variance;
-            full[(9 + axis, 9 + axis)] = self.checked.initial_rate_variance;
-        }
-        State {
-            track: Track {
-                stamp_ns: measured.stamp_ns,
-                motion: Motion {
-                    b_from_a: *measured.camera_from_tanker,
-                    velocity_in_b: Vector3::zeros(),
-                    rate_in_b: Vector3::zeros(),
-                    covariance: full,
-                },
-            },
-            consistent_frames: 1,
-            seen_ns: measured.stamp_ns,
-            lag: Lag::default(),
-        }
-    }
-
-    fn noise(&self, lag: &Lag) -> &Noise {
-        if lag.is_manoeuvring() {
-            &self.checked.manoeuvre_noise
-        } else {
-            &self.checked.noise
-        }
     }
 
     fn with_floor(&self, covariance: &PoseCovariance) -> PoseCovariance {
@@ -400,23 +332,126 @@ impl Filter {
     }
 }
 
-fn check(pose: &Isometry3<f64>, covariance: &PoseCovariance) -> Result<(), MeasurementError> {
+impl Checked {
+    fn noise(&self, lag: &Lag) -> &Noise {
+        if lag.is_manoeuvring() {
+            &self.manoeuvre_noise
+        } else {
+            &self.noise
+        }
+    }
+
+    /// Makes a state the candidate that begins with a frame.
+    fn begin(&self, state: &mut Option<State>, frame: &Frame, measured: &Measured) {
+        let mut lasting = state
+            .take()
+            .map_or_else(Lasting::default, |state| state.lasting);
+        let noise = measured.noise.0 + lasting.start(&frame.lasting);
+        let mut covariance = Matrix12::zeros();
+        covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&noise);
+        for axis in 0..3 {
+            covariance[(6 + axis, 6 + axis)] = self.initial_speed_variance;
+            covariance[(9 + axis, 9 + axis)] = self.initial_rate_variance;
+        }
+        let motion = StateMotion {
+            stamp_ns: frame.stamp_ns,
+            given_causes: Motion {
+                b_from_a: measured.camera_from_tanker,
+                velocity_in_b: Vector3::zeros(),
+                rate_in_b: Vector3::zeros(),
+                covariance,
+            },
+            consistent_frames: 1,
+            lag: Lag::default(),
+        };
+        *state = Some(State { motion, lasting });
+    }
+}
+
+/// Corrects a track or candidate by a pose after it, and returns the squared innovation. What contradicts it leaves it
+/// as it was.
+fn step(
+    checked: &Checked,
+    scratch: &mut Lasting,
+    state: &mut State,
+    frame: &Frame,
+    measured: &Measured,
+) -> Result<f64, Refused> {
+    let StateMotion {
+        stamp_ns,
+        given_causes,
+        consistent_frames,
+        lag,
+    } = &state.motion;
+    let gap_s = seconds(frame.stamp_ns, *stamp_ns);
+    let transition = Transition::new(given_causes, gap_s);
+    let mut predicted = advance(given_causes, &transition, checked.noise(lag));
+    let difference = Difference::new(&predicted, &measured.camera_from_tanker);
+    scratch.clone_from(&state.lasting);
+    scratch.predict(gap_s, &transition, &mut predicted.covariance);
+    let noise = measured.noise.0 + scratch.see(&frame.lasting, &difference.turn);
+    let noise = PoseCovariance(noise);
+    let sums = scratch.sums();
+    let innovate = |from: &Motion| {
+        let covariance = from.pose_covariance();
+        Innovation::new(&difference, &covariance, &noise, sums.as_ref())
+            .ok_or(Refused::LostPrecision)
+    };
+    let mut innovation = innovate(&predicted)?;
+    let innovation_squared = innovation.squared;
+    if innovation_squared > checked.gate {
+        return Err(Refused::Contradicts { innovation_squared });
+    }
+    let next_lag = lag.with(&innovation.whitened, gap_s, checked.lag_limit);
+    if next_lag.is_manoeuvring() && !lag.is_manoeuvring() {
+        // It has lagged since it began to lean, so the larger noise is owed for that time too.
+        add_noise(
+            &mut predicted,
+            MEMORY_FRAMES * gap_s,
+            &checked.manoeuvre_noise,
+        );
+        innovation = innovate(&predicted)?;
+    }
+    let correction = innovation
+        .correct(&predicted, sums.as_ref())
+        .ok_or(Refused::LostPrecision)?;
+    scratch.correct(&correction);
+    std::mem::swap(&mut state.lasting, scratch);
+    state.motion = StateMotion {
+        stamp_ns: frame.stamp_ns,
+        given_causes: correction.motion,
+        consistent_frames: consistent_frames.saturating_add(1),
+        lag: next_lag,
+    };
+    Ok(innovation_squared)
+}
+
+fn check(
+    pose: &Isometry3<f64>,
+    noise: &PoseCovariance,
+    lasting: &[LastingError],
+) -> Result<(), MeasurementError> {
     let position = pose.translation.vector;
     let numbers = position.iter().chain(pose.rotation.coords.iter());
     if !numbers.copied().all(f64::is_finite) {
         return Err(MeasurementError::PoseNotFinite);
     }
-    let is_symmetric = covariance.0 == covariance.0.transpose();
-    if !(is_symmetric && Factor::new(&rows(&covariance.0)).is_some()) {
+    let is_usable = |error: &LastingError| {
+        error.shift.iter().all(|number| number.is_finite())
+            && error.time_constant_s.is_none_or(|s| s > 0.0)
+    };
+    if !lasting.iter().all(is_usable) {
+        return Err(MeasurementError::InvalidLastingError);
+    }
+    let is_symmetric = noise.0 == noise.0.transpose();
+    // All of the noise may last: then the frame has none of its own.
+    let whole = lasting.iter().fold(noise.0, |sum, error| {
+        sum + error.shift * error.shift.transpose()
+    });
+    let is_covariance = |m: &Matrix6<f64>| Factor::new(&rows(&symmetric(m))).is_some();
+    let has_no_negative_variance = noise.0.diagonal().iter().all(|variance| *variance >= 0.0);
+    if !(is_symmetric && has_no_negative_variance && is_covariance(&whole)) {
         return Err(MeasurementError::InvalidCovariance);
     }
     Ok(())
-}
-
-/// Returns `later − earlier`; whole nanoseconds, so that no clock's epoch costs precision.
-pub(super) fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
-    // In 128 bits the difference of any two stamps exists.
-    let nanoseconds = i128::from(later_ns) - i128::from(earlier_ns);
-    // Divided, not multiplied: ten seconds are then exactly ten.
-    nanoseconds as f64 / 1e9
 }

@@ -1,8 +1,8 @@
 //! The last motion that a filter believed, which outlives its track: good enough to say where to look.
 
-use super::filter::seconds;
+use super::Filter;
 use super::model::{Noise, predict};
-use super::{Filter, Track};
+use super::track::{Track, seconds};
 use crate::geometry::Motion;
 
 /// A motion with what makes it unknown over time. It says nothing about whether anybody should fly by it: a track

@@ -80,7 +80,7 @@ impl Blocks {
     }
 }
 
-fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
+pub(super) fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
 
@@ -98,13 +98,54 @@ fn turn_columns(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
     m
 }
 
+/// Returns `diag(I, r) v`: only attitudes turn.
+pub(super) fn turned(v: &Vector6<f64>, r: &Matrix3<f64>) -> Vector6<f64> {
+    let mut turned = *v;
+    turned
+        .fixed_rows_mut::<3>(3)
+        .copy_from(&(r * v.fixed_rows::<3>(3)));
+    turned
+}
+
+/// How errors of the pose go on: `Φ` and `Γ`.
+pub(super) struct Transition {
+    dt_s: f64,
+    turn: UnitQuaternion<f64>,
+    phi: Matrix3<f64>,
+    gamma: Matrix3<f64>,
+}
+
+impl Transition {
+    pub(super) fn new(motion: &Motion, dt_s: f64) -> Self {
+        let by = motion.rate_in_b * dt_s;
+        let turn = UnitQuaternion::from_scaled_axis(by);
+        Self {
+            dt_s,
+            turn,
+            phi: turn.to_rotation_matrix().into_inner(),
+            gamma: left_jacobian(by),
+        }
+    }
+
+    /// Returns the error of the pose after errors of pose, and of velocity and rate, before.
+    pub(super) fn of_pose(&self, pose: &Vector6<f64>, rates: &Vector6<f64>) -> Vector6<f64> {
+        turned(pose, &self.phi) + turned(rates, &self.gamma) * self.dt_s
+    }
+}
+
 /// Returns `motion` after `dt_s ≥ 0`.
 pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
-    let turn = motion.rate_in_b * dt_s;
-    let turned = UnitQuaternion::from_scaled_axis(turn);
-    let phi = turned.to_rotation_matrix().into_inner();
-    let gamma = left_jacobian(turn);
+    advance(motion, &Transition::new(motion, dt_s), noise)
+}
 
+/// Returns `motion` after a transition from it.
+pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -> Motion {
+    let Transition {
+        dt_s,
+        turn,
+        phi,
+        gamma,
+    } = *transition;
     let before = Blocks::of(motion);
     let kept = turn_rows(before.cross, &phi);
     let gained = turn_rows(before.rates, &gamma) * dt_s;
@@ -121,7 +162,7 @@ pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
     predicted.b_from_a = Isometry3::from_parts(
         Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
         // Products of unit quaternions drift from length one by rounding.
-        UnitQuaternion::new_normalize((turned * motion.b_from_a.rotation).into_inner()),
+        UnitQuaternion::new_normalize((turn * motion.b_from_a.rotation).into_inner()),
     );
     after.store(&mut predicted);
     add_noise(&mut predicted, dt_s, noise);
@@ -145,6 +186,30 @@ pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
     }
 }
 
+/// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose,
+/// `W = H U + B` what the difference shows of them.
+pub(super) struct LastingSums {
+    /// `W Wᵀ`.
+    pub(super) seen: Matrix6<f64>,
+    /// `W Uᵀ`, of the pose.
+    pub(super) seen_pose: Matrix6<f64>,
+    /// `W Uᵀ`, of velocity and rate.
+    pub(super) seen_rates: Matrix6<f64>,
+    /// `W Bᵀ`.
+    pub(super) seen_shift: Matrix6<f64>,
+}
+
+/// A motion corrected by a measurement, and by what gains.
+pub(super) struct Correction {
+    pub(super) motion: Motion,
+    /// `K` of the pose, transposed.
+    pub(super) pose_gain_t: Matrix6<f64>,
+    /// `K` of velocity and rate, transposed.
+    pub(super) rates_gain_t: Matrix6<f64>,
+    /// Turns errors of the attitude to stand about the corrected one.
+    pub(super) reset: Matrix3<f64>,
+}
+
 /// A measured pose held against a prediction.
 pub(super) struct Innovation {
     /// `ν`.
@@ -159,22 +224,48 @@ pub(super) struct Innovation {
     pub(super) squared: f64,
 }
 
+/// The difference of a measured pose from a predicted one.
+pub(super) struct Difference {
+    /// `ν`.
+    by: Vector6<f64>,
+    /// The measurement's own error turns with the attitude between the two: `Log(Exp(n) Exp(φ))`.
+    pub(super) turn: Matrix3<f64>,
+}
+
+impl Difference {
+    pub(super) fn new(predicted: &Motion, b_from_a: &Isometry3<f64>) -> Self {
+        let by = pose_error(b_from_a, &predicted.b_from_a);
+        Self {
+            by,
+            turn: left_jacobian_inverse(by.fixed_rows::<3>(3).into_owned()),
+        }
+    }
+}
+
 impl Innovation {
     /// Returns `None` when the covariances are so far apart that their sum has no factor.
+    ///
+    /// # Inputs
+    /// * `covariance`: of the predicted pose, given the lasting causes.
+    /// * `noise`: covariance of the measured pose, given the lasting causes.
+    /// * `lasting`: that of the difference by lasting causes; `None` without any.
     pub(super) fn new(
-        predicted: &Motion,
-        b_from_a: &Isometry3<f64>,
+        difference: &Difference,
         covariance: &PoseCovariance,
+        noise: &PoseCovariance,
+        lasting: Option<&LastingSums>,
     ) -> Option<Self> {
-        let difference = pose_error(b_from_a, &predicted.b_from_a);
-        // The measurement's own error turns with the attitude between the two: Log(Exp(n) Exp(φ)).
-        let turn = left_jacobian_inverse(difference.fixed_rows::<3>(3).into_owned());
-        let noise = symmetric(&turn_columns(turn_rows(covariance.0, &turn), &turn));
-        let factor = Factor::new(&rows(&(predicted.pose_covariance().0 + noise)))?;
-        let whitened = Vector6::from(factor.whiten(&difference.into()));
+        let turn = &difference.turn;
+        let noise = symmetric(&turn_columns(turn_rows(noise.0, turn), turn));
+        let mut sum = covariance.0 + noise;
+        if let Some(sums) = lasting {
+            sum += symmetric(&sums.seen);
+        }
+        let factor = Factor::new(&rows(&sum))?;
+        let whitened = Vector6::from(factor.whiten(&difference.by.into()));
         let squared = whitened.norm_squared();
         squared.is_finite().then_some(Self {
-            difference,
+            difference: difference.by,
             noise,
             inverse: factor.inverse(),
             whitened,
@@ -183,19 +274,35 @@ impl Innovation {
     }
 
     /// Returns the motion corrected by the measurement; `None` when its covariance would not be positive
-    /// definite.
-    pub(super) fn corrected(&self, predicted: &Motion) -> Option<Motion> {
+    /// definite. Covariances of motions are those given the lasting causes.
+    pub(super) fn correct(
+        &self,
+        predicted: &Motion,
+        lasting: Option<&LastingSums>,
+    ) -> Option<Correction> {
         let before = Blocks::of(predicted);
-        // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N.
-        let pose_gain_t = self.inverse * before.pose;
-        let rates_gain_t = self.inverse * before.cross;
-        let rest_t = self.inverse * self.noise;
+        // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N; with causes each has its part of them.
+        let mut pose_gain_t = self.inverse * before.pose;
+        let mut rates_gain_t = self.inverse * before.cross;
+        let mut rest_t = self.inverse * self.noise;
+        if let Some(sums) = lasting {
+            pose_gain_t += self.inverse * sums.seen_pose;
+            rates_gain_t += self.inverse * sums.seen_rates;
+            rest_t += self.inverse * sums.seen_shift;
+        }
         let rest = rest_t.transpose();
         let mut after = Blocks {
             pose: rest * before.pose * rest_t + pose_gain_t.transpose() * self.noise * pose_gain_t,
             cross: rest * before.cross,
             rates: before.rates - before.cross.transpose() * rates_gain_t,
         };
+        if lasting.is_some() {
+            // The gain is not the best one given the causes, so what cancels in the two lines above does not here.
+            let slipped = self.noise * rates_gain_t;
+            after.cross += pose_gain_t.tr_mul(&slipped) - rest * (before.pose * rates_gain_t);
+            after.rates += rates_gain_t.tr_mul(&(before.pose * rates_gain_t + slipped))
+                - rates_gain_t.tr_mul(&before.cross);
+        }
 
         let pose_step = pose_gain_t.tr_mul(&self.difference);
         let rates_step = rates_gain_t.tr_mul(&self.difference);
@@ -217,6 +324,11 @@ impl Innovation {
         corrected.velocity_in_b += rates_step.fixed_rows::<3>(0);
         corrected.rate_in_b += rates_step.fixed_rows::<3>(3);
         after.store(&mut corrected);
-        after.is_positive_definite().then_some(corrected)
+        after.is_positive_definite().then_some(Correction {
+            motion: corrected,
+            pose_gain_t,
+            rates_gain_t,
+            reset,
+        })
     }
 }

@@ -35,7 +35,15 @@ pub enum TrackOutcome {
         /// Its stamp, ns.
         stamp_ns: i64,
     },
-    /// Its image was taken before that of the last accepted frame: too late to be used.
+    /// Its image was taken before that of a frame that has come already, and it was taken at its own time: the track is
+    /// as if it had come in order.
+    Inserted {
+        /// Behind the newest frame, s.
+        late_by_s: f64,
+        /// Whether it has corrected the track: it has a pose, which does not contradict the track of that time.
+        was_used: bool,
+    },
+    /// Its image was taken so long before that of the last accepted frame that it cannot be used any more.
     Late {
         /// By this much, s.
         late_by_s: f64,
@@ -106,6 +114,16 @@ impl fmt::Display for TrackOutcome {
                 "expected a squared innovation of at most {limit:.1}, got {innovation_squared:.1}: not used"
             ),
             Self::Duplicate { .. } => write!(f, "a stamp that has been seen: not used"),
+            Self::Inserted {
+                late_by_s,
+                was_used: true,
+            } => write!(f, "late by {late_by_s:.3} s: used at its own time"),
+            Self::Inserted { late_by_s, .. } => {
+                write!(
+                    f,
+                    "late by {late_by_s:.3} s: nothing to use at its own time"
+                )
+            }
             Self::Late { late_by_s } => write!(f, "late by {late_by_s:.3} s: not used"),
             Self::Invalid(error) => write!(f, "{error}"),
             Self::Coasting { gap_s } => write!(f, "no pose for {gap_s:.3} s"),
@@ -145,6 +163,9 @@ pub enum MeasurementError {
     /// The covariance is not one.
     #[error("expected a finite, symmetric, positive definite covariance, got none")]
     InvalidCovariance,
+    /// A lasting error is not one.
+    #[error("expected finite shifts and positive time constants of lasting errors, got others")]
+    InvalidLastingError,
 }
 
 /// Why there is no prediction for a stamp.

@@ -170,7 +170,7 @@ def test_every_frame_of_an_approach_has_honest_odometry_once_the_track_is_confir
     assert np.mean(twist_nees) < high
 
 
-def test_late_and_repeated_frames_are_answered_but_leave_the_track_alone(flyer: Flyer) -> None:
+def test_late_frames_are_used_at_their_own_time_and_repeated_ones_not_at_all(flyer: Flyer) -> None:
     last = flyer.confirm()
     left_out = flyer.next_index()
     newest = flyer.frame(flyer.next_index())
@@ -178,9 +178,9 @@ def test_late_and_repeated_frames_are_answered_but_leave_the_track_alone(flyer: 
     before = len(flyer.odometry)
 
     answer, track, _ = flyer.ask(flyer.frame(left_out))
-    assert (answer.outcome, track) == ("OK", "OUT_OF_ORDER")
+    assert (answer.outcome, track) == ("OK", "INSERTED")
     assert answer.pose is not None
-    for repeated in (newest, flyer.frame(last)):
+    for repeated in (newest, flyer.frame(last), flyer.frame(left_out)):
         stamp = key(repeated.header.stamp)
         flyer.estimator.send(repeated)
         statuses = flyer.estimator.statuses[stamp]
@@ -189,7 +189,16 @@ def test_late_and_repeated_frames_are_answered_but_leave_the_track_alone(flyer: 
         assert TRACKS[statuses[-1].track] == "OUT_OF_ORDER"
 
     assert flyer.ask(flyer.frame(flyer.next_index()))[1] == "UPDATED"
-    assert len(flyer.odometry) == before + 1, "odometry for a frame that was not used"
+    assert len(flyer.odometry) == before + 1, "odometry that goes back in time"
+
+
+def test_a_frame_that_is_late_by_more_than_half_a_second_is_not_used(flyer: Flyer) -> None:
+    flyer.confirm()
+    left_out = flyer.next_index()
+    for _ in range(round(0.6 / PERIOD_S)):
+        flyer.ask(flyer.frame(flyer.next_index()))
+    answer, track, _ = flyer.ask(flyer.frame(left_out))
+    assert (answer.outcome, track) == ("OK", "OUT_OF_ORDER")
 
 
 def test_without_poses_the_track_is_predicted_with_growing_covariance_then_dropped_and_found_again(

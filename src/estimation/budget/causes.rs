@@ -14,6 +14,11 @@ use crate::geometry::{PoseCovariance, skew};
 pub enum CauseKind {
     /// Noise of single detections.
     Noise,
+    /// The part of it that lasts from frame to frame.
+    CorrelatedNoise {
+        /// How long, s.
+        time_constant_s: f64,
+    },
     /// The place of markers on the tanker: constant.
     Survey,
     /// A way in which the airframe bends.
@@ -32,7 +37,7 @@ pub enum CauseKind {
 /// One cause in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its name: that of a mode, or `noise`, `survey`, `jitter_u`, `jitter_v`, `attitude`.
+    /// Its name: that of a mode, or `noise`, `correlated_noise`, `survey`, `jitter_u`, `jitter_v`, `attitude`.
     pub name: String,
     /// What kind of cause it is.
     pub kind: CauseKind,
@@ -47,11 +52,16 @@ pub struct Cause {
 /// All causes in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameCauses {
-    /// Noise first, then survey, flex, calibration, jitter, attitude, as far as the budget has them.
+    /// Noise first, then what lasts of it, survey, flex, calibration, jitter, attitude, as far as the budget has them.
     pub causes: Vec<Cause>,
     /// For each used marker with a survey error: its id and the error of the pose that one sigma of it makes along
     /// each of the tanker's axes.
     pub survey_shifts: Vec<(u32, [Vector6<f64>; 3])>,
+    /// With noise that lasts: for each used marker its id and the error of the pose that one sigma of it makes in u and
+    /// in v.
+    pub noise_shifts: Vec<(u32, [Vector6<f64>; 2])>,
+    /// With a prior of the attitude: the error of the pose that one sigma of it makes about each of the camera's axes.
+    pub attitude_shifts: Option<[Vector6<f64>; 3]>,
 }
 
 impl FrameCauses {
@@ -124,23 +134,14 @@ pub(in crate::estimation) fn frame_causes(
     let shifts = covariance * &through;
     let estimates = -&amplitudes * explained;
 
-    let mut noise = Matrix6::zeros();
-    let mut survey = Matrix6::zeros();
-    let mut survey_shifts = Vec::new();
-    for (at, row) in rows.iter().enumerate() {
-        let mut pull = row.by_pose.tr_mul(&row.weight);
-        for (m, mode) in modes.iter().enumerate() {
-            pull -= through.column(m) * (row.weight * mode.shifts[at]).transpose();
-        }
-        let gain = covariance * pull;
-        noise += gain * gain.transpose() * row.noise_px.powi(2);
-        if row.survey_m > 0.0 {
-            let by_marker = gain * row.by_marker * row.survey_m;
-            survey += by_marker * by_marker.transpose();
-            let axis = |axis: usize| by_marker.column(axis).into_owned();
-            survey_shifts.push((row.id, [axis(0), axis(1), axis(2)]));
-        }
-    }
+    let lasting_noise = budget.and_then(ErrorBudget::correlated_noise);
+    let lasting_share = lasting_noise.map_or(0.0, |lasting| lasting.share());
+    let Own {
+        noise,
+        noise_shifts,
+        survey,
+        survey_shifts,
+    } = own_errors(&rows, &modes, &through, &covariance, lasting_share);
     let share = |matrix: Matrix6<f64>| PoseCovariance((matrix + matrix.transpose()) * 0.5);
     let many = |name: &str, kind: CauseKind, covariance: Matrix6<f64>| Cause {
         name: name.to_owned(),
@@ -149,7 +150,17 @@ pub(in crate::estimation) fn frame_causes(
         shift: None,
         covariance: share(covariance),
     };
-    let mut causes = vec![many("noise", CauseKind::Noise, noise)];
+    let mut causes = vec![many(
+        "noise",
+        CauseKind::Noise,
+        noise * (1.0 - lasting_share),
+    )];
+    if let Some(lasting) = lasting_noise {
+        let kind = CauseKind::CorrelatedNoise {
+            time_constant_s: lasting.time_constant_s(),
+        };
+        causes.push(many("correlated_noise", kind, noise * lasting_share));
+    }
     if !survey_shifts.is_empty() {
         causes.push(many("survey", CauseKind::Survey, survey));
     }
@@ -163,15 +174,69 @@ pub(in crate::estimation) fn frame_causes(
             covariance: share(shift * shift.transpose()),
         });
     }
+    let mut attitude_shifts = None;
     if attitude_information > 0.0 {
-        let gain = covariance.fixed_view::<6, 3>(0, 3).into_owned();
-        let by_prior = gain * gain.transpose() * attitude_information;
+        let gain = covariance.fixed_view::<6, 3>(0, 3) * attitude_information.sqrt();
+        let by_prior = gain * gain.transpose();
         causes.push(many("attitude", CauseKind::Attitude, by_prior));
+        attitude_shifts = Some([0, 1, 2].map(|axis| gain.column(axis).into_owned()));
     }
     Some(FrameCauses {
         causes,
         survey_shifts,
+        noise_shifts,
+        attitude_shifts,
     })
+}
+
+/// What the errors of single points do to the pose.
+struct Own {
+    noise: Matrix6<f64>,
+    noise_shifts: Vec<(u32, [Vector6<f64>; 2])>,
+    survey: Matrix6<f64>,
+    survey_shifts: Vec<(u32, [Vector6<f64>; 3])>,
+}
+
+/// Returns the shares of noise and survey, and their shifts.
+///
+/// # Inputs
+/// * `through`: information that pose and modes share, times the covariance of the modes given the pose.
+/// * `covariance`: of the pose.
+/// * `lasting_share`: what part of the noise lasts.
+fn own_errors(
+    rows: &[Row],
+    modes: &[Mode],
+    through: &DMatrix<f64>,
+    covariance: &Matrix6<f64>,
+    lasting_share: f64,
+) -> Own {
+    let mut own = Own {
+        noise: Matrix6::zeros(),
+        noise_shifts: Vec::new(),
+        survey: Matrix6::zeros(),
+        survey_shifts: Vec::new(),
+    };
+    for (at, row) in rows.iter().enumerate() {
+        let mut pull = row.by_pose.tr_mul(&row.weight);
+        for (m, mode) in modes.iter().enumerate() {
+            pull -= through.column(m) * (row.weight * mode.shifts[at]).transpose();
+        }
+        let gain = covariance * pull;
+        own.noise += gain * gain.transpose() * row.noise_px.powi(2);
+        if lasting_share > 0.0 {
+            let by_noise = gain * (row.noise_px * lasting_share.sqrt());
+            let axis = |axis: usize| by_noise.column(axis).into_owned();
+            own.noise_shifts.push((row.id, [axis(0), axis(1)]));
+        }
+        if row.survey_m > 0.0 {
+            let by_marker = gain * row.by_marker * row.survey_m;
+            own.survey += by_marker * by_marker.transpose();
+            let axis = |axis: usize| by_marker.column(axis).into_owned();
+            own.survey_shifts
+                .push((row.id, [axis(0), axis(1), axis(2)]));
+        }
+    }
+    own
 }
 
 fn row(

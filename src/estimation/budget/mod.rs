@@ -13,6 +13,7 @@
 //! gives the same, at a cost linear in the number of points.
 
 mod causes;
+mod correlated_noise;
 mod frame;
 mod gram;
 mod in_doubt;
@@ -27,6 +28,7 @@ use crate::target::MAX_FLEX_MODES;
 
 pub(super) use causes::frame_causes;
 pub use causes::{Cause, CauseKind, FrameCauses};
+pub use correlated_noise::{CorrelatedNoise, CorrelatedNoiseError};
 pub(super) use frame::{AttitudePrior, FrameBudget};
 pub(super) use in_doubt::InDoubt;
 
@@ -61,6 +63,7 @@ pub struct ErrorBudget {
     flex: Vec<FlexMode>,
     calibration: Vec<CalibrationMode>,
     jitter_px: f64,
+    correlated_noise: Option<CorrelatedNoise>,
     /// By id, ascending.
     markers: Vec<MarkerBudget>,
     image: Vec<ImageMode>,
@@ -154,9 +157,26 @@ impl ErrorBudget {
             flex,
             calibration,
             jitter_px,
+            correlated_noise: None,
             markers,
             image,
         }
+    }
+
+    /// Returns the budget with a part of the detections' noise that lasts. Single frames are estimated as without it;
+    /// the track takes less of them as new.
+    #[must_use]
+    pub fn with_correlated_noise(self, correlated_noise: Option<CorrelatedNoise>) -> Self {
+        Self {
+            correlated_noise,
+            ..self
+        }
+    }
+
+    /// Returns the part of the detections' noise that lasts, if any does.
+    #[must_use]
+    pub fn correlated_noise(&self) -> Option<CorrelatedNoise> {
+        self.correlated_noise
     }
 
     /// Returns whether nothing is in doubt: then the estimate is that without a budget.

@@ -1,0 +1,237 @@
+//! Errors that frames have in common: carried beside the motion, never averaged out.
+//!
+//! A survey error, a bent wing or a wrong focal length shifts the pose of every frame in nearly the same way. A filter
+//! that takes such poses as independent becomes sure of a wrong position. Here each cause `c` of unit variance is a
+//! consider state: it is not estimated, but its covariance with the motion is kept. With `δ` the error of the motion,
+//! two matrices are carried, and `P` is what is published:
+//!
+//! ```text
+//! Q = cov(δ | c)      U = E[δ cᵀ]      P = Q + U Uᵀ
+//! ```
+//!
+//! With `B` the shifts that one sigma of each cause makes in a frame, `N` the noise of its own, `H = (I 0)`:
+//!
+//! | step | formula |
+//! |---|---|
+//! | start | `U = −H' B`, since the pose itself is the first belief |
+//! | predict | `U ← a Φ U`, `Q ← Φ Q Φᵀ + (1 − a²) Φ U Uᵀ Φᵀ + noise`; `a = exp(−dt/τ)`, 1 for a constant cause |
+//! | innovation | `W = H U + B`, `S = H Q Hᵀ + W Wᵀ + N` |
+//! | update | `K = (Q Hᵀ + U Wᵀ) S⁻¹`, `Q ← (I − K H) Q (I − K H)ᵀ + K N Kᵀ`, `U ← U − K W` |
+//!
+//! # Source
+//! Schmidt, *Application of state-space methods to navigation problems*, 1966 (consider states). DIFFERENCE: given the
+//! causes, the error of the motion has a covariance of its own, so that `P` stays positive definite by its form.
+
+use nalgebra::{Matrix3, Matrix6, Vector6};
+
+use super::model::{Correction, LastingSums, Transition, turned};
+use crate::geometry::{Matrix12, Vector12, principal_root};
+
+/// Causes that are carried one by one; the smaller ones of a larger budget are carried together. A claim about their
+/// motion would then be wrong, so those with a time constant count as constant and as noise.
+const MAX_SINGLE: usize = 58;
+/// The numbers from here on are those of the causes that are carried together, one for each axis.
+const TOGETHER: u64 = u64::MAX - 5;
+
+/// The error of one frame's pose by a cause that other frames have in common with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LastingError {
+    /// Which cause: the same number in every frame. Numbers of `u64::MAX − 5` and more are taken.
+    pub cause: u64,
+    /// Error of the pose that one sigma of the cause makes, in the order of
+    /// [`PoseCovariance`](crate::geometry::PoseCovariance).
+    pub shift: Vector6<f64>,
+    /// How long the cause lasts (a Gauss–Markov process of first order), s; `None`: for the whole flight.
+    pub time_constant_s: Option<f64>,
+}
+
+/// One cause: its column of `U`, and its shift of the latest frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Column {
+    cause: u64,
+    time_constant_s: Option<f64>,
+    pose: Vector6<f64>,
+    rates: Vector6<f64>,
+    /// Its column of `B`; zero when the frame does not have it.
+    shift: Vector6<f64>,
+}
+
+impl Column {
+    fn new(error: &LastingError) -> Self {
+        Self {
+            cause: error.cause,
+            time_constant_s: error.time_constant_s,
+            pose: Vector6::zeros(),
+            rates: Vector6::zeros(),
+            shift: error.shift,
+        }
+    }
+
+    /// Its column of `W`.
+    fn seen(&self) -> Vector6<f64> {
+        self.pose + self.shift
+    }
+}
+
+/// The causes of a track. It keeps its memory when it is filled anew.
+#[derive(Debug, PartialEq, Default)]
+pub(super) struct Lasting {
+    columns: Vec<Column>,
+}
+
+impl Clone for Lasting {
+    fn clone(&self) -> Self {
+        Self {
+            columns: self.columns.clone(),
+        }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.columns.clone_from(&source.columns);
+    }
+}
+
+impl Lasting {
+    /// Forgets all causes, then takes those of a frame whose pose is the first belief. Returns what [`Self::see`] does.
+    pub(super) fn start(&mut self, errors: &[LastingError]) -> Matrix6<f64> {
+        self.columns.clear();
+        let noise = self.see(errors, &Matrix3::identity());
+        for column in &mut self.columns {
+            column.pose = -column.shift;
+        }
+        noise
+    }
+
+    /// Lets time pass. `added` takes what is no longer common to before and after.
+    pub(super) fn predict(&mut self, dt_s: f64, transition: &Transition, added: &mut Matrix12) {
+        for column in &mut self.columns {
+            column.pose = transition.of_pose(&column.pose, &column.rates);
+            let Some(time_constant_s) = column.time_constant_s else {
+                continue;
+            };
+            let kept = (-dt_s / time_constant_s).exp();
+            let lost = 1.0 - kept * kept;
+            add_outer(added, column, lost);
+            column.pose *= kept;
+            column.rates *= kept;
+        }
+    }
+
+    /// Takes the shifts of a frame, whose attitude errors are turned by `turn`. Returns the covariance of those that do
+    /// not last and have no column of their own: they are carried together as constant, and count as noise besides.
+    pub(super) fn see(&mut self, errors: &[LastingError], turn: &Matrix3<f64>) -> Matrix6<f64> {
+        for column in &mut self.columns {
+            column.shift = Vector6::zeros();
+        }
+        let mut together = Matrix6::zeros();
+        let mut noise = Matrix6::zeros();
+        // Frames list their causes in about the same order: the next one is often next.
+        let mut hint = 0;
+        for error in errors {
+            let error = LastingError {
+                shift: turned(&error.shift, turn),
+                ..*error
+            };
+            if let Some(at) = self.place(error.cause, hint) {
+                self.columns[at].shift = error.shift;
+                self.columns[at].time_constant_s = error.time_constant_s;
+                hint = at + 1;
+            } else if self.columns.len() < MAX_SINGLE {
+                self.columns.push(Column::new(&error));
+                hint = self.columns.len();
+            } else {
+                let covariance = error.shift * error.shift.transpose();
+                together += covariance;
+                if error.time_constant_s.is_some() {
+                    noise += covariance;
+                }
+            }
+        }
+        if together != Matrix6::zeros() {
+            self.see_together(&together);
+        }
+        noise
+    }
+
+    /// Takes the covariance of the causes that have no column of their own.
+    fn see_together(&mut self, covariance: &Matrix6<f64>) {
+        let root = principal_root(covariance);
+        for (cause, axis) in (TOGETHER..=u64::MAX).zip(0..6) {
+            let shift = root.column(axis).into_owned();
+            if let Some(at) = self.place(cause, MAX_SINGLE + axis) {
+                self.columns[at].shift = shift;
+            } else {
+                self.columns.push(Column::new(&LastingError {
+                    cause,
+                    shift,
+                    time_constant_s: None,
+                }));
+            }
+        }
+    }
+
+    fn place(&self, cause: u64, hint: usize) -> Option<usize> {
+        let is_it = |column: &Column| column.cause == cause;
+        if self.columns.get(hint).is_some_and(is_it) {
+            return Some(hint);
+        }
+        self.columns.iter().position(is_it)
+    }
+
+    /// Returns what innovation and gain need; `None` without causes.
+    pub(super) fn sums(&self) -> Option<LastingSums> {
+        let mut sums = LastingSums {
+            seen: Matrix6::zeros(),
+            seen_pose: Matrix6::zeros(),
+            seen_rates: Matrix6::zeros(),
+            seen_shift: Matrix6::zeros(),
+        };
+        for column in &self.columns {
+            let seen = column.seen();
+            for (sum, other) in [
+                (&mut sums.seen, &seen),
+                (&mut sums.seen_pose, &column.pose),
+                (&mut sums.seen_rates, &column.rates),
+                (&mut sums.seen_shift, &column.shift),
+            ] {
+                sum.ger(1.0, &seen, other, 1.0);
+            }
+        }
+        (!self.columns.is_empty()).then_some(sums)
+    }
+
+    /// Follows a correction of the motion: `U − K W`.
+    pub(super) fn correct(&mut self, correction: &Correction) {
+        for column in &mut self.columns {
+            let seen = column.seen();
+            let pose = column.pose - correction.pose_gain_t.tr_mul(&seen);
+            column.pose = turned(&pose, &correction.reset);
+            column.rates -= correction.rates_gain_t.tr_mul(&seen);
+        }
+    }
+
+    /// Returns a column of `U`.
+    #[cfg(test)]
+    pub(super) fn column(&self, at: usize) -> Option<Vector12> {
+        let column = self.columns.get(at)?;
+        let mut both = Vector12::zeros();
+        both.fixed_rows_mut::<6>(0).copy_from(&column.pose);
+        both.fixed_rows_mut::<6>(6).copy_from(&column.rates);
+        Some(both)
+    }
+
+    /// Adds `U Uᵀ`.
+    pub(super) fn add_to(&self, covariance: &mut Matrix12) {
+        for column in &self.columns {
+            add_outer(covariance, column, 1.0);
+        }
+    }
+}
+
+/// Adds the outer product of a column of `U` with itself, `times`.
+fn add_outer(covariance: &mut Matrix12, column: &Column, times: f64) {
+    let mut both = Vector12::zeros();
+    both.fixed_rows_mut::<6>(0).copy_from(&column.pose);
+    both.fixed_rows_mut::<6>(6).copy_from(&column.rates);
+    covariance.ger(times, &both, &both, 1.0);
+}
