@@ -15,6 +15,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from ruamel.yaml import YAML
 
+from harness.domains import claimed_domain
 from harness.processes import binary, child_environment
 
 NODE = "tanker_pose"
@@ -51,20 +52,27 @@ def defaults() -> dict[str, Any]:
 
 
 def rclpys(arguments: list[str], defaults: dict[str, Any]) -> dict[str, Any] | str:
-    """The same of an rclpy node that declares the same parameters."""
+    """The same of an rclpy node that declares the same parameters.
+
+    In a domain of its own: Fast DDS may wait forever for its own callbacks when a participant ends while it discovers
+    those of other tests.
+    """
     context = Context()
     node = None
-    try:
-        rclpy.init(args=["--ros-args", *arguments], context=context)
-        node = Node(NODE, context=context, start_parameter_services=False, enable_rosout=False)
-        return {name: node.declare_parameter(name, value).value for name, value in defaults.items()}
-    except Exception:  # noqa: BLE001 rcl's own classes are private
-        return REFUSED
-    finally:
-        if node is not None:
-            node.destroy_node()
-        if context.ok():
-            context.shutdown()
+    with claimed_domain() as domain:
+        try:
+            rclpy.init(args=["--ros-args", *arguments], context=context, domain_id=domain)
+            node = Node(NODE, context=context, start_parameter_services=False, enable_rosout=False)
+            return {
+                name: node.declare_parameter(name, value).value for name, value in defaults.items()
+            }
+        except Exception:  # noqa: BLE001 rcl's own classes are private
+            return REFUSED
+        finally:
+            if node is not None:
+                node.destroy_node()
+            if context.ok():
+                context.shutdown()
 
 
 def written(case: list[str], directory: Path) -> list[str]:
