@@ -27,8 +27,8 @@ ros2_node::declare_parameters! {
         tanker_frame_id: String = frame_id("tanker").fixed();
         /// also publish trusted poses to /tf, parent: the camera's optical frame
         publish_tf: bool = output();
-        /// be a managed node: it loads marker map and refuelling file and opens its topics when it is configured,
-        /// and answers detections while it is active
+        /// be a managed node: it reads its files (marker map, refuelling, calibration budget) and opens its topics when
+        /// it is configured, and answers detections while it is active
         lifecycle: bool = switch(false).fixed();
         /// take the time of diagnostics and parameter events from /clock;
         /// stamps of poses are those of the detections either way, never read from a clock

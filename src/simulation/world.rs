@@ -23,14 +23,10 @@ pub struct World {
     /// Amplitude of each flex mode in its sigmas.
     flex_sigmas: Vec<f64>,
     /// Phases of the waves that move each flex mode, rad.
-    phases: Vec<Phases>,
-    /// What lasts of the noise of each marker's u and v, in its sigmas, and phases of the waves that move it; empty
-    /// where all noise is each frame's own.
-    lasting_noise: Vec<[(f64, Phases); 2]>,
+    phases: Vec<[f64; WAVES_PER_CONSTANT.len()]>,
+    /// What lasts of the noise of each marker's u and v, in its sigmas; empty where all noise is each frame's own.
+    lasting_noise: Vec<[f64; 2]>,
 }
-
-/// Of the waves that move one number, rad.
-type Phases = [f64; WAVES_PER_CONSTANT.len()];
 
 /// Periods of the waves that move one number, in its time constants; without a common multiple.
 const WAVES_PER_CONSTANT: [f64; 4] = [3.1, 4.7, 7.3, 11.9];
@@ -62,12 +58,10 @@ impl World {
             .iter()
             .map(|_| WAVES_PER_CONSTANT.map(|_| random.random_range(0.0..TAU)))
             .collect();
-        let mut lasting = || {
-            let phases = WAVES_PER_CONSTANT.map(|_| random.random_range(0.0..TAU));
-            (normal(random), phases)
-        };
         let noisy = budget.correlated_noise().map_or(0, |_| markers.len());
-        let lasting_noise = (0..noisy).map(|_| [lasting(), lasting()]).collect();
+        let lasting_noise = (0..noisy)
+            .map(|_| [normal(random), normal(random)])
+            .collect();
         Self {
             camera: camera.with_change(&change),
             believed: markers.to_vec(),
@@ -79,8 +73,8 @@ impl World {
         }
     }
 
-    /// Returns the world at a time: flex modes with a time constant, and noise that lasts, move as a sum of waves of one
-    /// sigma altogether, the same whatever was asked before.
+    /// Returns the world at a time: flex modes with a time constant move as a sum of waves of one sigma altogether, the
+    /// same whatever was asked before. Noise that lasts stays as it is: that of an [`Approach`](super::Approach) is its own.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut world = self.clone();
@@ -88,11 +82,6 @@ impl World {
         for ((mode, phases), amplitude) in modes.zip(&mut world.flex_sigmas) {
             if let Some(time_constant_s) = mode.time_constant_s {
                 *amplitude = waves(time_s / time_constant_s, phases);
-            }
-        }
-        if let Some(noise) = self.budget.correlated_noise() {
-            for (amplitude, phases) in world.lasting_noise.iter_mut().flatten() {
-                *amplitude = waves(time_s / noise.time_constant_s(), phases);
             }
         }
         world
@@ -130,7 +119,7 @@ impl World {
             }
         }
         if let Some(noise) = self.budget.correlated_noise() {
-            for (amplitude, _) in self.lasting_noise.iter_mut().flatten() {
+            for amplitude in self.lasting_noise.iter_mut().flatten() {
                 wander(amplitude, noise.time_constant_s());
             }
         }
@@ -156,7 +145,7 @@ impl World {
             .filter_map(|(index, (marker, surveyed))| {
                 let lasting = self.lasting_noise.get(index);
                 let noise = [0, 1].map(|axis| {
-                    let lasting = lasting.map_or(0.0, |noise| share.sqrt() * noise[axis].0);
+                    let lasting = lasting.map_or(0.0, |noise| share.sqrt() * noise[axis]);
                     sigma_px * (lasting + (1.0 - share).sqrt() * normal(random))
                 });
                 let q = camera_from_tanker * (surveyed + self.flex_of(marker.id));
@@ -193,7 +182,7 @@ impl World {
 }
 
 /// Returns a sum of waves of unit variance at a time in time constants.
-fn waves(time: f64, phases: &Phases) -> f64 {
+fn waves(time: f64, phases: &[f64; WAVES_PER_CONSTANT.len()]) -> f64 {
     let waves = WAVES_PER_CONSTANT.iter().zip(phases);
     let sum: f64 = waves
         .map(|(period, phase)| (TAU * time / period + phase).sin())
