@@ -1,4 +1,4 @@
-//! What a calibration may have wrong, from a file: standard deviations, or a whole covariance.
+//! The error budget of a calibration, read from a file: standard deviations, or a full covariance.
 
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -10,48 +10,50 @@ use super::{Camera, CameraError, CameraInfo};
 use crate::text::quoted;
 use crate::yaml::{self, Place, YamlError};
 
-/// What a file may name, in `OpenCV`'s order of the coefficients.
+/// The parameters that a file may name, in `OpenCV`'s order of the coefficients.
 const NAMES: [&str; 12] = [
     "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
 ];
-/// Of these, how many are pixels.
+/// How many of them are in pixels; they come first.
 const PIXELS: usize = 4;
-/// Largest standard deviation of focal length and principal point, px: beyond it, it is not one of a calibration.
+/// Largest plausible standard deviation of a focal length or principal point, px.
 const MAX_PX: f64 = 100.0;
-/// Largest standard deviation of a coefficient; far ones are large where a lens says little about them.
+/// Largest accepted standard deviation of a coefficient. High-order coefficients that the images hardly constrain have
+/// large ones.
 const MAX_COEFFICIENT: f64 = 1000.0;
-/// Share of a standard deviation's square below which it is rounding.
+/// Eigenvalues and pivots below this, relative to the variances, are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// What a calibration may have wrong, checked.
+/// Checked error budget of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationBudget {
-    /// Places in [`NAMES`].
+    /// Indices into [`NAMES`].
     parameters: Vec<usize>,
-    /// A factor of the covariance, in the file's units: each column is what one cause does at one sigma.
+    /// A factor of the covariance, in the file's units: each column is the effect of one independent cause at one
+    /// sigma.
     columns: Vec<Vec<f64>>,
-    /// What each column is called: the first parameter that it moves.
+    /// The name of each column: the first parameter that it changes.
     names: Vec<String>,
 }
 
-/// Why a file says nothing about a calibration; each message begins with the place at fault.
+/// Why a calibration budget cannot be read; each message begins with the position in the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum CalibrationBudgetError {
-    /// No YAML, or not in the file's shape.
+    /// Not YAML, or not in the file's format.
     #[error(transparent)]
     Yaml(#[from] YamlError),
-    /// Neither kind of numbers, or both.
+    /// Neither `sigmas` nor `covariance`, or both.
     #[error("{place}: expected either sigmas or covariance")]
     NotOne { place: Place },
-    /// A parameter that calibrations do not have.
+    /// An unknown parameter name.
     #[error("{place}: expected one of {}, got {}", NAMES.join(", "), quoted(name))]
     UnknownName { place: Place, name: String },
-    /// A parameter that stands twice.
-    #[error("{place}: {name} stands twice")]
+    /// A parameter that is listed twice.
+    #[error("{place}: {name} is listed twice")]
     Twice { place: Place, name: &'static str },
-    /// Rows that make no square matrix.
+    /// The rows do not form a square matrix of the right size.
     #[error(
         "{place}: data must be {need} rows of {need} numbers, one for each parameter, got {got}"
     )]
@@ -60,7 +62,7 @@ pub enum CalibrationBudgetError {
         need: usize,
         got: String,
     },
-    /// A number that is no standard deviation.
+    /// Not a plausible standard deviation.
     #[error("{place}: the sigma of {name} must be 0 to {most}, got {value}")]
     Sigma {
         place: Place,
@@ -68,7 +70,7 @@ pub enum CalibrationBudgetError {
         most: f64,
         value: f64,
     },
-    /// A matrix that differs from its transpose.
+    /// The matrix differs from its transpose.
     #[error(
         "{place}: data must be symmetric, but has {above} for {row} with {column} and {below} for {column} with {row}"
     )]
@@ -79,7 +81,7 @@ pub enum CalibrationBudgetError {
         above: f64,
         below: f64,
     },
-    /// A symmetric matrix that is no covariance.
+    /// The matrix is symmetric but not positive semidefinite.
     #[error(
         "{place}: data must be positive semidefinite, but has the eigenvalue {least:.3} (of the correlations)"
     )]
@@ -118,11 +120,11 @@ struct RawCovariance {
 }
 
 impl CalibrationBudget {
-    /// Returns what a file says: `sigmas` by name, or `covariance` with `parameters` and the rows of a matrix (`data`);
-    /// px for fx, fy, cx and cy, of the raw image.
+    /// Returns the budget in a file: `sigmas` by name, or `covariance` with `parameters` and the rows of a matrix
+    /// (`data`). fx, fy, cx and cy are in px of the raw image.
     ///
     /// # Errors
-    /// [`CalibrationBudgetError`] with the place of the value at fault.
+    /// [`CalibrationBudgetError`] with the position of the invalid value.
     ///
     /// ```
     /// use tanker_pose::camera::CalibrationBudget;
@@ -142,17 +144,18 @@ impl CalibrationBudget {
         }
     }
 
-    /// Returns each cause by its name, with the change that it makes at one sigma of a camera that was read from `info`.
+    /// Returns each cause by its name, with the change of calibration that it makes at one sigma. `camera` is the
+    /// camera made from `info`.
     ///
     /// # Errors
-    /// [`CameraError::BudgetOfOtherLens`] where the lens has not the coefficient that the file names.
+    /// [`CameraError::BudgetOfOtherLens`] if the lens does not have a coefficient that the file names.
     pub fn changes(
         &self,
         info: &CameraInfo,
         camera: &Camera,
     ) -> Result<Vec<(String, CalibrationChange)>, CameraError> {
         let is_equidistant = matches!(camera.lens, Some(Lens::Equidistant(_)));
-        // Of the raw image; a camera info for rectified images may have none.
+        // The file's unit is px of the raw image. A camera info for rectified images may lack K.
         let of_raw = |k: f64, used: f64| if k > 0.0 { k } else { used };
         let (fx, fy) = (of_raw(info.k[0], camera.fx), of_raw(info.k[4], camera.fy));
         let places: Vec<(usize, f64)> = self
@@ -162,7 +165,7 @@ impl CalibrationBudget {
                 Ok(match parameter {
                     0 => (0, 1.0 / fx),
                     1 => (1, 1.0 / fy),
-                    // Pixels of the image that detections come in: binned, or rectified.
+                    // In pixels of the image that detections come in, which may be binned or rectified.
                     2 => (2, camera.fx / fx),
                     3 => (3, camera.fy / fy),
                     _ => (
@@ -182,7 +185,7 @@ impl CalibrationBudget {
         Ok(changes.collect())
     }
 
-    /// Returns the standard deviation of each parameter, for people.
+    /// Returns the standard deviation of each parameter, formatted for log lines.
     #[must_use]
     pub fn in_words(&self) -> String {
         let parts: Vec<String> = self
@@ -199,7 +202,7 @@ impl CalibrationBudget {
         parts.join(", ")
     }
 
-    /// Returns the budget of a checked covariance: its lower triangular factor, without the columns that are zero.
+    /// Returns the budget of a checked covariance: its lower triangular factor, without zero columns.
     fn of_covariance(
         parameters: Vec<usize>,
         sigmas: &[f64],
@@ -211,7 +214,7 @@ impl CalibrationBudget {
         let mut correlations = DMatrix::from_fn(count, count, |i, j| {
             covariance[(i, j)] * of(sigmas[i]) * of(sigmas[j])
         });
-        // What is exact goes with nothing.
+        // A parameter without variance must have no covariance with others.
         let is_stray = |i: usize| sigmas[i] == 0.0 && covariance.row(i).amax() > 0.0;
         let least = if (0..count).any(is_stray) {
             covariance.symmetric_eigenvalues().min()
@@ -297,7 +300,7 @@ impl RawCovariance {
         for (i, row) in rows.iter().enumerate() {
             let place = Place::at(source, row.referenced);
             let variance = covariance[(i, i)];
-            // The root of what is negative is not a number, and refused as such.
+            // The root of a negative variance is NaN, which the check of the sigma refuses.
             sigmas.push(checked_sigma(parameters[i], variance.sqrt(), place)?);
         }
         for (i, row) in rows.iter().enumerate() {
@@ -341,7 +344,7 @@ fn checked_sigma(
     })
 }
 
-/// Returns the place of a coefficient in D.
+/// Returns the index of a coefficient in D.
 fn coefficient(parameter: usize, is_equidistant: bool) -> Result<usize, CameraError> {
     let index = parameter - PIXELS;
     if !is_equidistant {
@@ -480,7 +483,7 @@ mod tests {
                 of("[fx, f]", "[[1]]"),
                 "c.yaml:2:20: expected one of fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6, got \"f\"",
             ),
-            (of("[fx, fx]", "[[1]]"), "c.yaml:2:20: fx stands twice"),
+            (of("[fx, fx]", "[[1]]"), "c.yaml:2:20: fx is listed twice"),
             (
                 of("[fx, fy]", "[[1, 0]]"),
                 "c.yaml:3:9: data must be 2 rows of 2 numbers, one for each parameter, got 1 rows",

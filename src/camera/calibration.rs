@@ -1,15 +1,15 @@
-//! What a wrong calibration does to pixels: their derivatives, and the camera that it changes into.
+//! The effect of calibration errors: derivatives of pixels by the calibration, and a camera with changed calibration.
 
 use nalgebra::{Point2, SMatrix, SVector};
 
 use super::distortion::{BrownConrady, Equidistant, Lens};
 use super::{Camera, Ray};
 
-/// Numbers of a calibration: `ln fx, ln fy, cx, cy`, then D in the order of `sensor_msgs/CameraInfo`.
+/// The parameters of a calibration: `ln fx, ln fy, cx, cy`, then D in the order of `sensor_msgs/CameraInfo`.
 ///
-/// Focal lengths by their logarithm: a change of 0.01 is one of 1 %.
+/// Focal lengths enter by their logarithm: a change of 0.01 is 1 %.
 pub const CALIBRATION_SIZE: usize = 12;
-/// Place of the first coefficient of D.
+/// Index of the first coefficient of D.
 pub const FIRST_COEFFICIENT: usize = 4;
 
 /// A change of a calibration: see [`CALIBRATION_SIZE`] for its order; px for cx and cy.
@@ -18,8 +18,8 @@ pub type CalibrationChange = SVector<f64, CALIBRATION_SIZE>;
 impl Camera {
     /// Returns the derivative of the pixel (u, v) of a ray by the calibration, px; `None` where the ray has no pixel.
     ///
-    /// Without a lens model D means `plumb_bob`'s and `rational_polynomial`'s coefficients at zero, and with
-    /// `equidistant` its four; the columns of further ones are zero.
+    /// Without a lens model, D stands for the coefficients of `rational_polynomial` at zero. With `equidistant` it has
+    /// four coefficients; the remaining columns are zero.
     #[must_use]
     pub fn pixel_by_calibration(&self, ray: Ray) -> Option<SMatrix<f64, 2, CALIBRATION_SIZE>> {
         let ideal = Point2::new(ray.x, ray.y);
@@ -45,7 +45,7 @@ impl Camera {
         Some(by)
     }
 
-    /// Returns the camera with its calibration changed; a camera without a lens model gets one of `plumb_bob`'s kind
+    /// Returns the camera with its calibration changed. A camera without a lens model gets a `rational_polynomial` one
     /// if a coefficient changes.
     #[must_use]
     pub fn with_change(&self, change: &CalibrationChange) -> Self {

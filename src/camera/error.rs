@@ -1,4 +1,4 @@
-//! Why a camera info can't be used, and why a pixel has no ray.
+//! Why a camera info cannot be used, and why a pixel has no ray.
 
 use crate::text::{clip, list};
 
@@ -7,20 +7,20 @@ use crate::text::{clip, list};
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum CameraError {
-    /// All zero intrinsics: how ROS marks a camera that was never calibrated.
+    /// The intrinsics are all zero, which is how ROS marks an uncalibrated camera.
     #[error("the camera is not calibrated (k[0] is {fx:?})")]
     NotCalibrated { fx: f64 },
-    /// Rectified pixels are announced, but the projection of the rectified image is left zero.
+    /// Rectified pixels are configured, but the projection of the rectified image is zero.
     #[error("the camera has no projection for rectified pixels (p[0] is {fx:?})")]
     NoProjection { fx: f64 },
-    /// A number that is used is NaN or infinite.
+    /// A number that is needed is NaN or infinite.
     #[error("{array}[{index}] must be finite, got {value:?}")]
     NotFinite {
         array: &'static str,
         index: usize,
         value: f64,
     },
-    /// A focal length that no lens has: negative, not in pixels, or a slipped digit.
+    /// An implausible focal length: negative, not in pixels, or off by orders of magnitude.
     #[error("{array}[{index}], a focal length, must be {min} to {max:e} px, got {value:?}")]
     FocalLength {
         array: &'static str,
@@ -29,7 +29,7 @@ pub enum CameraError {
         min: f64,
         max: f64,
     },
-    /// A principal point so far away that it can't be one.
+    /// An implausibly distant principal point.
     #[error(
         "{array}[{index}], the principal point, must be within {limit:e} px of the image, got {value:?}"
     )]
@@ -52,12 +52,12 @@ pub enum CameraError {
         width: u32,
         height: u32,
     },
-    /// What the calibration may have wrong is told for another kind of lens.
+    /// The calibration's error budget names a coefficient that this lens model does not have.
     #[error(
         "the calibration's error budget names {name}, which the lens model equidistant does not have"
     )]
     BudgetOfOtherLens { name: &'static str },
-    /// Width and height stand in each other's place.
+    /// Width and height are swapped.
     #[error(
         "width {width} and height {height} are exchanged, or belong to another calibration: the principal point \
          ({cx}, {cy}) is the centre of an image of {height}x{width}"
@@ -68,7 +68,7 @@ pub enum CameraError {
         width: u32,
         height: u32,
     },
-    /// The intrinsics are those of the binned image, where those of full resolution belong.
+    /// The intrinsics are those of the binned image; those of full resolution are needed.
     #[error(
         "the principal point ({cx}, {cy}) of {array} is the centre of the image after binning by \
          {binning_x}x{binning_y}: k and p must be those of the full resolution, or set binning to 1"
@@ -80,9 +80,9 @@ pub enum CameraError {
         binning_x: u32,
         binning_y: u32,
     },
-    /// The intrinsics were found at another resolution, or those of the whole are used for a part.
+    /// The intrinsics belong to another resolution, or to the full image where only a part is read out.
     #[error(
-        "the principal point ({cx}, {cy}) of {array} is the centre of an image of {}x{}, but width and height say \
+        "the principal point ({cx}, {cy}) of {array} is the centre of an image of {}x{}, but width and height are \
          {width}x{height}: calibrate at the resolution that is used, or scale {array} to it; if the image is a part of \
          a larger one, set roi, and width and height of the full image",
         (2.0 * cx).round(),
@@ -103,7 +103,7 @@ pub enum CameraError {
         value: f64,
         limit: f64,
     },
-    /// An entry that the form of the matrix fixes.
+    /// An entry whose value the matrix's form prescribes.
     #[error("{array}[{index}] must be {expected}, got {value:?}")]
     FixedEntry {
         array: &'static str,
@@ -111,14 +111,14 @@ pub enum CameraError {
         expected: f64,
         value: f64,
     },
-    /// The projection belongs to a stereo pair's second camera.
+    /// The projection belongs to the second camera of a stereo pair.
     #[error(
         "p[{index}] must be 0, got {value:?}: it holds a stereo pair's baseline, and the projection of one camera is needed"
     )]
     Baseline { index: usize, value: f64 },
-    /// A lens that we have no formula for.
+    /// An unknown lens model.
     #[error(
-        "distortion model `{}` with d = [{}] is not known; known are {known}{hint}",
+        "distortion model `{}` with d = [{}] is unknown; known models are {known}{hint}",
         clip(model),
         list(d)
     )]
@@ -128,7 +128,7 @@ pub enum CameraError {
         known: &'static str,
         hint: &'static str,
     },
-    /// More or fewer coefficients than the lens model has.
+    /// The number of coefficients does not match the lens model.
     #[error(
         "distortion model `{}` needs {need} coefficients (more only if those are 0), got {got}: d = [{}]",
         clip(model),
@@ -140,19 +140,19 @@ pub enum CameraError {
         got: usize,
         d: Vec<f64>,
     },
-    /// A coefficient that no calibration gives.
+    /// An implausible distortion coefficient.
     #[error("d[{index}] must be within {limit:e}, got {value:?}")]
     CoefficientTooLarge {
         index: usize,
         value: f64,
         limit: f64,
     },
-    /// Only one side of the image is known.
+    /// Only one dimension of the image is given.
     #[error(
         "image width and height must both be positive, or both 0 for unknown, got {width}x{height}"
     )]
     ImageSize { width: u32, height: u32 },
-    /// A region of interest without pixels that is not the all-zero region, which means the whole image.
+    /// An empty region of interest that is not all zero (all zero means the whole image).
     #[error("the region of interest has no pixels: {width}x{height} at ({x_offset}, {y_offset})")]
     EmptyRegion {
         width: u32,
@@ -160,7 +160,7 @@ pub enum CameraError {
         x_offset: u32,
         y_offset: u32,
     },
-    /// A region of interest that reaches beyond the image.
+    /// The region of interest extends beyond the image.
     #[error(
         "the region of interest, {width}x{height} at ({x_offset}, {y_offset}), reaches beyond the image of {image_width}x{image_height}"
     )]
@@ -172,7 +172,7 @@ pub enum CameraError {
         image_width: u32,
         image_height: u32,
     },
-    /// Binning that leaves no pixel.
+    /// The binning leaves no pixel.
     #[error("binning {binning_x}x{binning_y} leaves no pixel of {width}x{height}")]
     BinningTooLarge {
         binning_x: u32,
@@ -187,10 +187,10 @@ pub enum CameraError {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum UndistortError {
-    /// The pixel is NaN or infinite, or so large that its ray is.
+    /// The pixel is NaN or infinite, or so large that its ray is not finite.
     #[error("pixel ({u:?}, {v:?}) must be finite and have a finite ray")]
     NotFinite { u: f64, v: f64 },
-    /// No ray that the lens model was made for falls on this pixel.
+    /// The pixel is outside the valid region of the lens model.
     #[error(
         "pixel ({u:?}, {v:?}) lies outside the valid region of the lens model: its distorted radius is \
          {radius:.6} on the plane z = 1, the model reaches {max_radius:.6} in this direction"

@@ -1,4 +1,4 @@
-//! The calibration file of ROS's `camera_calibration_parsers` -> a [`CameraInfo`].
+//! Reads the calibration file format of ROS's `camera_calibration_parsers` into a [`CameraInfo`].
 
 use std::borrow::Cow;
 use std::fmt;
@@ -11,16 +11,16 @@ use super::{CameraInfo, RegionOfInterest};
 use crate::text::{clip, list};
 use crate::yaml::{self, Place, YamlError};
 
-/// Why a calibration file cannot be read; each message begins with the place at fault.
+/// Why a calibration file cannot be read; each message begins with the position in the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum CameraFileError {
-    /// No YAML, or not in a calibration file's shape.
+    /// Not YAML, or not in the format of a calibration file.
     #[error(transparent)]
     Yaml(#[from] YamlError),
-    /// A matrix of another size than the format has.
-    #[error("{place}: {matrix} must have {need_rows} x {need_cols} entries, says {rows} x {cols}")]
+    /// A matrix whose size is not the format's.
+    #[error("{place}: {matrix} must have {need_rows} x {need_cols} entries, but is declared as {rows} x {cols}")]
     MatrixSize {
         place: Place,
         matrix: &'static str,
@@ -29,7 +29,7 @@ pub enum CameraFileError {
         need_rows: usize,
         need_cols: usize,
     },
-    /// A matrix whose number of data differs from rows times columns.
+    /// A matrix whose amount of data differs from rows times columns.
     #[error("{place}: data of {matrix} must hold {need} numbers, got {got}")]
     DataLength {
         place: Place,
@@ -47,20 +47,20 @@ pub enum CameraFileError {
     },
 }
 
-/// What was assumed or skipped in a calibration file that was read.
+/// What was assumed or ignored while reading a calibration file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CameraFileWarning {
-    /// No lens model is named.
+    /// No lens model is given.
     ModelAssumed {
-        /// What the file is called.
+        /// The name of the file.
         source: String,
     },
-    /// Keys that the format does not have.
+    /// Keys that are not part of the format.
     UnknownKeys {
-        /// What the file is called.
+        /// The name of the file.
         source: String,
-        /// Their names, in the order of the alphabet.
+        /// Their names, sorted.
         keys: Vec<String>,
     },
 }
@@ -83,14 +83,14 @@ impl fmt::Display for CameraFileWarning {
     }
 }
 
-/// What ROS's reader takes for the lens model where a file names none.
+/// The lens model that ROS's reader assumes if a file does not name one.
 const ASSUMED_MODEL: &str = "plumb_bob";
 
 #[derive(Deserialize)]
 struct RawInfo {
     image_width: u32,
     image_height: u32,
-    /// Part of the format, without a place in a camera info.
+    /// Part of the format, but a camera info has no field for it.
     #[serde(rename = "camera_name", default)]
     _camera_name: Option<IgnoredAny>,
     camera_matrix: RawMatrix,
@@ -116,7 +116,7 @@ struct RawMatrix {
     data: Spanned<Vec<Spanned<f64>>>,
 }
 
-/// Names of the keys that no field takes.
+/// Names of unknown keys.
 #[derive(Default)]
 struct UnknownKeys(Vec<String>);
 
@@ -154,20 +154,20 @@ struct RawRegion {
 }
 
 impl CameraInfo {
-    /// Returns the camera info that a calibration file describes, and what had to be assumed.
+    /// Returns the camera info in a calibration file, and warnings about what was assumed.
     ///
-    /// The shape is that of `config/cameras/paper.yaml`, which `camera_calibration` writes; since `image_common`
-    /// 4.1.0 ROS adds binning and region of interest. Only the shape is checked; [`super::Camera::from_info`] checks
-    /// what the numbers mean.
+    /// The format is that of `config/cameras/paper.yaml`, which `camera_calibration` writes; since `image_common` 4.1.0
+    /// ROS adds binning and region of interest. Only the format is checked here; [`super::Camera::from_info`] checks
+    /// the values.
     ///
     /// # Inputs
-    /// * `text`: the YAML. As in ROS's own reader `camera_name`, binning and region may be left out, a missing
-    ///   `distortion_model` is `plumb_bob` (with a warning), the coefficients may stand in a row or a column, and
-    ///   unknown keys are skipped (with a warning). A first line `%YAML:1.0`, as `OpenCV` writes it, is skipped.
-    /// * `source`: what errors call the text, usually its path.
+    /// * `text`: the YAML. As in ROS's own reader, `camera_name`, binning and region are optional, a missing
+    ///   `distortion_model` is taken as `plumb_bob` (with a warning), the coefficients may be a row or a column, and
+    ///   unknown keys are ignored (with a warning). A first line `%YAML:1.0`, as `OpenCV` writes it, is ignored.
+    /// * `source`: the name of the text in errors, usually its path.
     ///
     /// # Errors
-    /// [`CameraFileError`] with the line and column of the value at fault.
+    /// [`CameraFileError`] with line and column of the invalid value.
     ///
     /// ```
     /// use tanker_pose::camera::{Camera, CameraInfo};
@@ -183,7 +183,8 @@ impl CameraInfo {
         text: &str,
         source: &str,
     ) -> Result<(Self, Vec<CameraFileWarning>), CameraFileError> {
-        // Not YAML's own directive, which has a space for the colon: a comment, so that lines keep their numbers.
+        // `OpenCV` writes this line; YAML's own directive has a space instead of the colon. It is turned into a
+        // comment, so that line numbers stay right.
         let text = match text.strip_prefix("%YAML:") {
             Some(rest) => Cow::Owned(format!("#YAML:{rest}")),
             None => Cow::Borrowed(text),
@@ -231,7 +232,7 @@ impl CameraInfo {
 }
 
 impl RawMatrix {
-    /// Returns the entries, row-major, of a matrix that must have this size.
+    /// Returns the entries, row-major, of a matrix of this size.
     fn read(
         &self,
         source: &str,
@@ -259,9 +260,9 @@ impl RawMatrix {
         self.numbers(source, matrix, need_rows.saturating_mul(need_cols))
     }
 
-    /// Returns the entries of a matrix of any size, such as a row or a column.
+    /// Returns the entries of a matrix of any size, for example a row or a column.
     fn any_size(&self, source: &str, matrix: &'static str) -> Result<Vec<f64>, CameraFileError> {
-        // Saturating: no product of the file's numbers may overflow.
+        // Saturating, since the product of the declared sizes may overflow.
         self.numbers(
             source,
             matrix,
@@ -365,11 +366,11 @@ mod tests {
     fn matrices_of_another_size_are_refused_at_their_line() {
         assert_eq!(
             refusal("camera_matrix:\n  rows: 3", "camera_matrix:\n  rows: 2"),
-            "c.yaml:5:9: camera_matrix must have 3 x 3 entries, says 2 x 3"
+            "c.yaml:5:9: camera_matrix must have 3 x 3 entries, but is declared as 2 x 3"
         );
         assert_eq!(
             refusal("cols: 4", "cols: 3"),
-            "c.yaml:19:9: projection_matrix must have 3 x 4 entries, says 3 x 3"
+            "c.yaml:19:9: projection_matrix must have 3 x 4 entries, but is declared as 3 x 3"
         );
         assert_eq!(
             refusal(

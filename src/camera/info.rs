@@ -1,4 +1,4 @@
-//! The plain data of `sensor_msgs/CameraInfo`, and what its numbers mean.
+//! The plain data of `sensor_msgs/CameraInfo`, and its checks.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use super::CameraError;
 use super::distortion::{BrownConrady, Equidistant, Lens};
 use super::model::Camera;
 
-/// `sensor_msgs/CameraInfo` without its header, as plain data: nothing is checked yet.
+/// `sensor_msgs/CameraInfo` without its header, as plain unchecked data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CameraInfo {
     /// Image height at full resolution, px.
@@ -42,43 +42,44 @@ pub struct RegionOfInterest {
     pub height: u32,
     /// Width, px.
     pub width: u32,
-    /// Whether a separate rectified region is meant.
+    /// Whether a separate rectified region is used.
     pub do_rectify: bool,
 }
 
-/// Least focal length, px: below it the numbers are not in pixels.
+/// Least focal length, px; with less, the numbers are probably not in pixels.
 const MIN_FOCAL_LENGTH_PX: f64 = 1.0;
 /// Largest focal length, px: a metre-long lens on one-micrometre pixels.
 const MAX_FOCAL_LENGTH_PX: f64 = 1.0e6;
-/// Farthest principal point, px, where the size of the image is not known: on some sensor.
+/// Largest distance of the principal point, px, if the image size is unknown.
 const MAX_PRINCIPAL_POINT_PX: f64 = 1.0e6;
-/// Farthest principal point outside the image, in image sizes: an image cropped to the corner of its sensor, a
-/// quarter as wide, still passes.
+/// Largest distance of the principal point from the image, in image sizes. A crop from the corner of a sensor twice as
+/// wide and high still passes.
 const MAX_SIZES_OUTSIDE: f64 = 1.0;
-/// How near to the centre of the image a principal point usually is, in image sizes.
+/// Usual distance of the principal point from the centre of the image, in image sizes.
 const USUAL_OFFSET: f64 = 0.04;
-/// From this offset on, in image sizes, another reading of the numbers that puts it at the centre is the likely one.
+/// From this offset on, in image sizes, another interpretation of the numbers is considered if it puts the principal
+/// point at the centre.
 const UNUSUAL_OFFSET: f64 = 0.08;
-/// How much the aspect ratios of two usual images differ at most: 16:9 and 5:4, with principal points that are a
-/// little off.
+/// Largest ratio between the aspect ratios of two common image formats (16:9 and 5:4), with some margin for the
+/// principal points.
 const MAX_ASPECT_CHANGE: f64 = 1.5;
-/// Largest skew, as a part of the focal length, that is rounding of a calibration and not skew: 1e-3 px at the
-/// edge of an image as wide as the focal length.
+/// Largest skew, relative to the focal length, that counts as rounding: 1e-3 px at the edge of an image as wide as the
+/// focal length.
 const MAX_SKEW: f64 = 1.0e-6;
 /// Least number of coefficients; missing ones after these are 0.
 const MIN_COEFFICIENTS: usize = 4;
-/// Largest distortion coefficient: those of long lenses are large, their rays being close to the axis.
+/// Largest distortion coefficient. Those of long lenses are large, because their rays are close to the axis.
 const MAX_COEFFICIENT: f64 = 1.0e9;
-/// How far an entry fixed by a matrix's form may be off: rounding of a program that computed it.
+/// Rounding tolerance for matrix entries with a prescribed value.
 const FIXED_ENTRY_TOLERANCE: f64 = 1.0e-9;
 
-/// Coefficients that an error keeps.
+/// Number of coefficients that an error stores.
 const MAX_TOLD: usize = 16;
-/// The models that have a formula here.
+/// The supported models.
 const KNOWN_MODELS: &str = "plumb_bob, rational_polynomial, equidistant";
 
-/// Parts of the names that vendors give to fisheye models, which bend rays even when all coefficients
-/// are 0: such a name is never taken for "no distortion".
+/// Parts of vendors' names for fisheye models. These bend rays even if all coefficients are 0, so such a name is never
+/// taken to mean "no distortion".
 const FISHEYE_NAMES: [&str; 6] = ["fish", "equi", "kannala", "omni", "theta", "stereographic"];
 
 impl Camera {
@@ -88,14 +89,12 @@ impl Camera {
     /// * `info`: the calibration. Its region of interest and binning are applied as `image_geometry`
     ///   does: the offset is subtracted from the principal point, then everything is divided by the
     ///   binning (0 means 1), without a shift by half a pixel. A width and height of 0 mean unknown.
-    /// * `rectified`: whether pixels are those of the rectified image. Then P counts and there is no
-    ///   distortion; otherwise K and D. Rays of rectified pixels are in the rectified camera frame:
-    ///   `r` is not used.
+    /// * `rectified`: whether pixels are those of the rectified image. If so, P is used without distortion; otherwise
+    ///   K and D. Rays of rectified pixels are in the rectified camera frame: `r` is not used.
     ///
     /// # Errors
-    /// [`CameraError`] with the value at fault: a camera that is not calibrated, numbers that no camera
-    /// has, skew, the baseline of a stereo pair, a lens model that is unknown or has another number of
-    /// coefficients, a region or binning without pixels.
+    /// [`CameraError`] with the invalid value: an uncalibrated camera, implausible numbers, skew, the baseline of a
+    /// stereo pair, an unknown lens model or a wrong number of coefficients, a region or binning without pixels.
     ///
     /// # Source
     /// REP 104; `sensor_msgs/msg/CameraInfo`.
@@ -106,7 +105,7 @@ impl Camera {
     /// Returns the checked pinhole camera with these focal lengths and principal point, px.
     ///
     /// # Errors
-    /// As [`Self::from_info`], which this is with `k` made of the four numbers.
+    /// As [`Self::from_info`] with a `k` made of the four numbers.
     pub fn from_intrinsics(
         fx: f64,
         fy: f64,
@@ -130,7 +129,7 @@ impl Camera {
 
 /// Returns the checked camera; see [`Camera::from_info`].
 fn camera(info: &CameraInfo, rectified: bool) -> Result<Camera, CameraError> {
-    // ROS marks an uncalibrated camera by k[0] alone, whichever matrix is used.
+    // ROS marks an uncalibrated camera by k[0] alone, regardless of which matrix is used.
     if info.k[0] == 0.0 {
         return Err(CameraError::NotCalibrated { fx: info.k[0] });
     }
@@ -237,10 +236,10 @@ fn check_skew(array: &'static str, values: &[f64], index: usize) -> Result<(), C
     Ok(())
 }
 
-/// Checks the principal point against the size of the full image, as far as that is known.
+/// Checks the principal point against the size of the full image, if that is known.
 ///
-/// Also notices three slips that leave each number plausible and the pose wrong: width and height exchanged,
-/// intrinsics of the binned image beside a binning, and a calibration made at another resolution.
+/// Also detects three mistakes that leave each number plausible and the pose wrong: swapped width and height,
+/// intrinsics of the binned image together with a binning, and a calibration made at another resolution.
 fn check_principal_point(
     info: &CameraInfo,
     array: &'static str,
@@ -299,12 +298,12 @@ fn check_principal_point(
     Ok(())
 }
 
-/// Returns whether a principal point, in image sizes, is the centre of another image that is larger, or smaller, both
-/// ways, and of nearly the same shape.
+/// Returns whether a principal point, in image sizes, would be the centre of another image: one that is larger or
+/// smaller in both directions, with a similar aspect ratio.
 ///
-/// An image cut from the sensor so that both its left and its upper part are missing (or both its right and its lower)
-/// looks the same. It is refused too: with the region of interest its numbers are clear, and without it a pose at twice
-/// the distance would be believed.
+/// A crop that removes both the left and the upper part of the sensor's image (or the right and the lower) looks the
+/// same. It is refused too: a region of interest would make its numbers unambiguous, and without one the alternative is
+/// a pose at twice the distance that looks right.
 fn is_of_another_resolution([x, y]: [f64; 2]) -> bool {
     let (most, least) = (x.max(y), x.min(y));
     let is_larger = least > 0.5 + UNUSUAL_OFFSET;
@@ -312,7 +311,7 @@ fn is_of_another_resolution([x, y]: [f64; 2]) -> bool {
     (is_larger || is_smaller) && most <= MAX_ASPECT_CHANGE * least
 }
 
-/// A principal point that is far from the centre of the image, though it may be right: displays as a warning.
+/// A principal point that is far from the centre of the image but may be right; displays as a warning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffCentre {
     cx: f64,
@@ -331,15 +330,15 @@ impl fmt::Display for OffCentre {
         } = self;
         write!(
             f,
-            "the principal point ({cx}, {cy}) is far from the centre of the image of {width}x{height}: right if the image \
-             is a part of a larger one (better said with roi, and width and height of the full image), wrong if the \
-             calibration was made at another resolution"
+            "the principal point ({cx}, {cy}) is far from the centre of the image of {width}x{height}: this is right if the image \
+             is a part of a larger one (better declared with roi, and width and height of the full image), and wrong if \
+             the calibration was made at another resolution"
         )
     }
 }
 
 impl CameraInfo {
-    /// Returns a warning where the principal point is more than 8 % of the image off its centre.
+    /// Returns a warning if the principal point is off the centre by more than 8 % of the image size.
     #[must_use]
     pub fn off_centre(&self, rectified: bool) -> Option<OffCentre> {
         let (cx, cy) = if rectified {
@@ -393,7 +392,7 @@ fn check_intrinsics(
     Ok(indices.map(|index| values[index]))
 }
 
-/// Returns the lens of the raw image; `None` when it does not distort.
+/// Returns the lens of the raw image; `None` without distortion.
 fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
     check_finite("d", d)?;
     if let Some((index, &value)) = d
@@ -418,7 +417,7 @@ fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
             let [k1, k2, p1, p2, k3] = coefficients(model, d, "4 or 5")?;
             Ok(Some(brown_conrady([k1, k2, k3, 0.0, 0.0, 0.0], [p1, p2])))
         }
-        // OpenCV's longer vectors go on with thin prism and tilt, which ROS's model does not have.
+        // OpenCV's longer vectors continue with thin prism and tilt, which ROS's model does not have.
         "rational_polynomial" => {
             let [k1, k2, p1, p2, k3, k4, k5, k6] = coefficients(model, d, "4 to 8")?;
             Ok(Some(brown_conrady([k1, k2, k3, k4, k5, k6], [p1, p2])))
@@ -437,10 +436,10 @@ fn lens(model: &str, d: &[f64]) -> Result<Option<Lens>, CameraError> {
     }
 }
 
-/// Returns a model's coefficients: missing ones at the end are 0, and more than the model has must be 0.
+/// Returns a model's coefficients. Missing ones at the end are 0; additional ones must be 0.
 ///
-/// Both are common: drivers with one message for every lens pad with zeros, and calibrations leave out what they
-/// did not estimate.
+/// Both are common: some drivers use one message for every lens and pad with zeros, and calibrations omit what they did
+/// not estimate.
 fn coefficients<const N: usize>(
     model: &str,
     d: &[f64],
@@ -471,7 +470,7 @@ fn names_a_fisheye(model: &str) -> bool {
     FISHEYE_NAMES.iter().any(|part| model.contains(part))
 }
 
-/// Returns the image size that detections see; `None` when it is not known.
+/// Returns the size of the image that detections come from; `None` if it is unknown.
 fn image_size(info: &CameraInfo) -> Result<Option<(u32, u32)>, CameraError> {
     let full = full_size(info.width, info.height)?;
     let RegionOfInterest {

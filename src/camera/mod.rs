@@ -1,16 +1,15 @@
-//! Pixel <-> ray: what a camera does to a direction before it becomes a place in an image.
+//! Conversion between pixels and rays.
 //!
-//! A [`CameraInfo`] is plain data from outside, unchecked; a [`Camera`] exists only checked. Knows ROS's
-//! rules for calibrations, lens formulas and their limits; never a topic, a file, a clock or what the
-//! rays are for.
+//! A [`CameraInfo`] is plain unchecked data; a [`Camera`] can only be constructed through the checks. This module
+//! contains ROS's rules for calibrations, lens formulas and their limits. It does not depend on topics, files, clocks
+//! or the use of the rays.
 //!
-//! Rays are in the `camera` frame (optical: x right, y down, z ahead), by their point on `z = 1`. Pixels
-//! are those that detections come in: of the raw or the rectified image, after region of interest and
-//! binning.
+//! Rays are in the `camera` frame (optical: x right, y down, z ahead), given by their point on `z = 1`. Pixels are
+//! those of the detections: of the raw or the rectified image, after region of interest and binning.
 //!
-//! A lens polynomial is calibrated inside the image and folds back somewhere outside. Both
-//! [`Camera::ray_from_pixel`] and [`Camera::project`] refuse what lies beyond the same limit, found at
-//! construction, instead of returning a ray that is plausible and wrong.
+//! A lens polynomial is calibrated inside the image and folds back somewhere outside. Both [`Camera::ray_from_pixel`]
+//! and [`Camera::project`] refuse points beyond the same limit, which is determined at construction, because the result
+//! would look plausible and be wrong.
 
 mod budget_file;
 mod calibration;

@@ -1,4 +1,4 @@
-//! A checked camera: pixel <-> ray.
+//! The checked camera: conversion between pixels and rays.
 
 use nalgebra::{Matrix2, Point2};
 
@@ -23,7 +23,7 @@ pub struct Ray {
     pub y: f64,
 }
 
-/// A checked camera: pinhole with or without lens distortion, in the pixels that detections come in.
+/// A checked camera: pinhole with or without lens distortion, for the pixels of the detections.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     pub(super) fx: f64,
@@ -40,8 +40,8 @@ impl Camera {
     /// Pixels outside the image are accepted as long as the lens model holds there.
     ///
     /// # Errors
-    /// [`UndistortError`] if the pixel is not finite, or no ray in the lens model's valid region falls
-    /// on it. Ends after a bounded number of steps whatever comes.
+    /// [`UndistortError`] if the pixel is not finite or outside the lens model's valid region. The number of steps is
+    /// bounded for every input.
     pub fn ray_from_pixel(&self, pixel: Pixel) -> Result<Ray, UndistortError> {
         let Pixel { u, v } = pixel;
         let distorted = Point2::new((u - self.cx) / self.fx, (v - self.cy) / self.fy);
@@ -69,8 +69,8 @@ impl Camera {
 
     /// Returns the pixel of a ray and the 2×2 derivative of pixel (u, v) by ray (x, y).
     ///
-    /// None outside the lens model's valid region, which is that of [`Self::ray_from_pixel`], and for a
-    /// ray or pixel that is not finite. A pixel outside the image is returned as such.
+    /// `None` outside the lens model's valid region, which is that of [`Self::ray_from_pixel`], and for a ray or pixel
+    /// that is not finite. A pixel outside the image is returned as such.
     #[inline]
     #[must_use]
     pub fn project(&self, ray: Ray) -> Option<(Pixel, Matrix2<f64>)> {
@@ -108,8 +108,8 @@ impl Camera {
             .then_some([self.fx, self.fy, self.cx, self.cy])
     }
 
-    /// Returns width and height of the image that detections come from, px, after region of interest
-    /// and binning; `None` when the camera info left them 0.
+    /// Returns width and height of the image that detections come from, px, after region of interest and binning;
+    /// `None` if the camera info left them 0.
     #[must_use]
     pub fn image_size_px(&self) -> Option<(u32, u32)> {
         self.image_size_px

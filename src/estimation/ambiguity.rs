@@ -1,8 +1,8 @@
-//! The second pose that might fit: the target mirrored in depth.
+//! Search for a second pose that fits the image: the target mirrored in depth.
 //!
-//! Far away, or with all markers near one plane, a camera cannot tell a target from its mirror image
-//! across the plane through its centre, perpendicular to the line of sight. That mirror image of a
-//! plane is a rotation of it, and a second minimum of the error lies close by.
+//! At long range, or with all markers near one plane, a camera cannot distinguish a target from its mirror image in the
+//! plane through its centre, perpendicular to the line of sight. For a planar target this mirror image is a rotated
+//! target, and a second minimum of the error is close to it.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -10,19 +10,19 @@ use super::centred_pose::CentredPose;
 use super::problem::{NEGLIGIBLE, Problem};
 use super::refine::Fit;
 
-/// Distance of two rotation matrices, in the Frobenius norm (√2 times the angle between them, rad), under which they
-/// are the same minimum.
+/// Distance of two rotation matrices in the Frobenius norm (√2 times the angle between them, rad) below which they
+/// count as the same minimum.
 pub(crate) const SAME_MINIMUM: f64 = 0.02;
 
-/// Returns the likelihood of a rival pose over that of the chosen one, at most 1.
+/// Returns the likelihood of a rival pose relative to that of the chosen one, at most 1.
 pub(crate) fn likelihood_ratio(rival_chi_squared: f64, chosen_chi_squared: f64) -> f64 {
     (0.5 * (chosen_chi_squared - rival_chi_squared))
         .exp()
         .min(1.0)
 }
 
-/// Returns the minimum in front of the camera that the mirrored target leads to; `None` when there is
-/// none that counts, or it is the chosen pose itself.
+/// Returns the minimum in front of the camera that descent from the mirrored target reaches; `None` if its likelihood
+/// is negligible or it is the chosen pose itself.
 pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     let pose = &chosen.pose;
     let start = mirror_image(problem, pose)?;
@@ -37,18 +37,18 @@ pub(crate) fn rival(problem: &Problem, chosen: &Fit) -> Option<Fit> {
     (!is_same(&fit.pose.rotation, &pose.rotation)).then_some(fit)
 }
 
-/// Returns the attitude of the mirrored target; `None` when the markers lie on one line.
+/// Returns the attitude of the mirrored target; `None` if the markers are collinear.
 #[inline]
 pub(crate) fn mirror_image(problem: &Problem, pose: &CentredPose) -> Option<Rotation3<f64>> {
     let normal = smallest_axis(&problem.points.scatter)?;
     Some(mirrored(&pose.rotation, &pose.centre_in_camera, &normal))
 }
 
-/// Returns the direction in which the markers spread least, of any length; `None` when they lie on one line.
+/// Returns the direction of least marker spread, not normalised; `None` if the markers are collinear.
 ///
-/// It is the column of a high power of the adjugate, whose largest eigenvalue belongs to the least of the
-/// scatter. With `q` the ratio of the two least spreads the direction is off by about `q^16` rad, enough
-/// to start a descent from: where `q` is near one there is no plane to mirror in.
+/// It is a column of a high power of the adjugate, whose largest eigenvalue belongs to the smallest of the scatter.
+/// With `q` the ratio of the two smallest spreads, the direction is off by about `q^16` rad, which is sufficient to
+/// start a descent: with `q` near one there is no plane to mirror in.
 fn smallest_axis(scatter: &Matrix3<f64>) -> Option<Vector3<f64>> {
     const SQUARINGS: usize = 4;
     let s = scatter;
@@ -97,7 +97,7 @@ fn mirrored(
     plane_normal: &Vector3<f64>,
 ) -> Rotation3<f64> {
     let (r, n, l) = (rotation.matrix(), plane_normal, centre_in_camera);
-    // One reflection after the other, as a sum each: R − (R n) 2 nᵀ / nᵀn, then the same from the left.
+    // The two reflections in turn, each as a sum: R − (R n) 2 nᵀ / nᵀn, then the same from the left.
     let turned = r - (r * n) * (n * (2.0 / n.norm_squared())).transpose();
     let mirrored = turned - l * (turned.tr_mul(l) * (2.0 / l.norm_squared())).transpose();
     Rotation3::from_matrix_unchecked(mirrored)

@@ -1,15 +1,15 @@
-//! A pose about the markers' mean, and its steps: what fits and their residuals share.
+//! A pose about the markers' mean, and increments of it; used by fits and residuals.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::lanes::information::Vector;
 use crate::geometry::cayley;
 
-/// rad, and share of the distance; a shorter step leaves the standard deviations as they are: to 0.15 % of
-/// themselves for the shipped maps, to about 1 % for a target that is flat and face on, or nearer than its size.
+/// rad, and share of the distance. A shorter step changes the standard deviations by at most 0.15 % for the shipped
+/// maps, and by about 1 % for a flat target seen face on, or one that is closer than its size.
 const NEAR: f64 = 7e-4;
 
-/// A pose as the fit moves it: rotation, and the camera coordinates of the markers' mean.
+/// A pose as the fit parametrises it: rotation, and the camera coordinates of the markers' mean.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CentredPose {
     pub(crate) rotation: Rotation3<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct CentredPose {
 }
 
 impl CentredPose {
-    /// Returns whether a step leaves the information as it is, to what [`NEAR`] says.
+    /// Returns whether a step is too short to change the information, to the accuracy stated at [`NEAR`].
     #[inline(always)]
     pub(crate) fn is_near(&self, step: &Vector) -> bool {
         let turn = Vector3::new(step[0], step[1], step[2]).norm_squared();
@@ -37,7 +37,7 @@ impl CentredPose {
         )
     }
 
-    /// Returns the pose after a step: turn before motion of the mean, rad and m, camera axes.
+    /// Returns the pose after an increment: rotation, then translation of the mean, rad and m, camera axes.
     #[inline(always)]
     pub(crate) fn moved(&self, step: &Vector) -> Self {
         Self {

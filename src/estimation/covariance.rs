@@ -1,4 +1,4 @@
-//! What the noise of the pixels does to a pose that is not the maximum likelihood one.
+//! Covariance of a pose that is not the maximum likelihood estimate.
 
 use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, SMatrix, Vector3, Vector6};
 use smallvec::SmallVec;
@@ -11,13 +11,13 @@ use super::lanes::symmetric3::Symmetric3;
 use crate::camera::{Camera, Ray};
 use crate::geometry::skew;
 
-/// Returns the covariance of a converged orthogonal iteration, rotation before position of the
-/// markers' mean; `None` when the points do not fix the pose.
+/// Returns the covariance of a converged orthogonal iteration, rotation before position of the markers' mean; `None` if
+/// the points do not determine the pose.
 ///
-/// The iteration minimises an error whose weights are not those of the noise, so its covariance is
-/// the sandwich `H⁻¹ B H⁻¹` and not the inverse of its own curvature: `J = [−[R p]×, I]`,
-/// `H = Σ JᵀWJ`, `B = Σ z² JᵀW C WJ`, `C` the covariance of the measured ray `(x, y, 1)`. Survey errors add to `C`; a
-/// mode, which moves many points together, adds the square of its whole pull.
+/// The weights of the iteration's error are not those of the noise, so its covariance is the sandwich `H⁻¹ B H⁻¹` and
+/// not the inverse of its curvature: `J = [−[R p]×, I]`, `H = Σ JᵀWJ`, `B = Σ z² JᵀW C WJ`, with `C` the covariance of
+/// the measured ray `(x, y, 1)`. Survey errors add to `C`. A mode, which moves many points together, adds the outer
+/// product of its total effect on the gradient.
 pub(crate) fn sandwich(
     camera: &Camera,
     observations: &[Observation],
@@ -27,7 +27,7 @@ pub(crate) fn sandwich(
 ) -> Option<Matrix6<f64>> {
     let mut curvature = Matrix6::zeros();
     let mut scatter = Matrix6::zeros();
-    // What each mode does to the gradient at one sigma, over all points.
+    // The effect of each mode on the gradient at one sigma, over all points.
     let mut pulls = SmallVec::<[Vector6<f64>; 16]>::new();
     for (index, observation) in observations.iter().enumerate() {
         let ray = camera.ray_from_pixel(observation.pixel).ok()?;
@@ -43,7 +43,7 @@ pub(crate) fn sandwich(
         scatter += half.transpose() * half;
         let Some(doubts) = doubts else { continue };
         let point = doubts.point(index);
-        // The ray moves by [1 0 -x; 0 1 -y] / z of what the marker does; times the depth.
+        // The derivative of the ray by the marker is [1 0 -x; 0 1 -y] / z; here it is multiplied by the depth.
         let ray_by_point = Matrix3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y, 0.0, 0.0, 0.0);
         let half = ray_by_point.transpose() * wj;
         scatter += half.transpose() * half * point.survey_variance_m2;

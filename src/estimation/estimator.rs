@@ -1,4 +1,4 @@
-//! The one call that turns observations into a judged pose.
+//! The estimator: from observations to a pose with the numbers to judge it by.
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
@@ -17,28 +17,28 @@ use super::{
 };
 use crate::camera::{Camera, Ray};
 
-/// rad; a subset that has turned farther from its prior has found a way to fit noise, not the tanker.
+/// rad; a subset whose pose is turned farther from its prior than this fits noise.
 const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
-/// Ratio of sigmas beyond which a point does not check the better ones.
+/// Points whose sigma is more than this ratio above that of the better ones do not check them.
 const WEAK_SIGMA_RATIO: f64 = 5.0;
-/// Ratio of sigmas beyond which a point claims more than the others can check.
+/// Points whose sigma is more than this ratio below the others' cannot be checked by them.
 const BOLD_SIGMA_RATIO: f64 = 2.0;
-/// Points from which on `min_points` asks for checks: with four, errors mostly pass unseen whatever they claim.
+/// From this many `min_points` on, the checks of sigmas apply. With four points most errors go undetected in any case.
 const CHECKED_FROM: usize = 5;
-/// rad; spread of the attitude about its prior: refuelling keeps the relative angles within ±5°.
+/// rad; standard deviation of the attitude about its prior: refuelling keeps the relative angles within ±5°.
 pub(crate) const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
-/// Settings with what can be computed once: the limits of the chi-squared test.
+/// Settings with precomputed limits of the chi-squared test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimator {
     settings: EstimatorSettings,
     limits: TrustLimits,
-    /// `None` if nothing is in doubt.
+    /// `None` without any stated errors.
     budget: Option<ErrorBudget>,
 }
 
-/// A fit with what is known about its rivals.
+/// A fit with its rivals.
 struct Judged<'a> {
     fit: &'a Fit,
     ambiguity: f64,
@@ -58,7 +58,7 @@ impl Estimator {
         }
     }
 
-    /// Returns the estimator with a budget of what map, calibration and airframe may have wrong. An empty one changes
+    /// Returns the estimator with a budget of the errors of map, calibration and airframe. An empty budget changes
     /// nothing.
     #[must_use]
     pub fn with_budget(self, budget: ErrorBudget) -> Self {
@@ -68,19 +68,20 @@ impl Estimator {
         }
     }
 
-    /// Returns the budget, if anything is in doubt.
+    /// Returns the error budget, if any.
     #[must_use]
     pub fn budget(&self) -> Option<&ErrorBudget> {
         self.budget.as_ref()
     }
 
-    /// Returns whether errors beside the noise of detections are stated: a budget, or a prior of the attitude.
+    /// Returns whether errors other than the noise of detections are stated: a budget, or a prior of the attitude.
     #[must_use]
     pub fn has_causes(&self) -> bool {
         self.budget.is_some() || self.settings.attitude_sigma_rad.is_some()
     }
 
-    /// Returns whether the causes are those of another estimator, so that an error of its poses may be the same in ours.
+    /// Returns whether another estimator has the same causes of error, so that errors of its poses are correlated with
+    /// those of this one.
     #[must_use]
     pub fn has_the_causes_of(&self, other: &Self) -> bool {
         let prior = |of: &Self| {
@@ -93,7 +94,7 @@ impl Estimator {
             && (!self.has_causes() || is_split(self) == is_split(other))
     }
 
-    /// Returns what each cause of the budget did in a frame: its amplitude and its share of the covariance; `None`
+    /// Returns the effect of each cause of the budget in a frame: its amplitude and its share of the covariance; `None`
     /// for an estimate that is not maximum likelihood.
     ///
     /// # Inputs
@@ -127,19 +128,19 @@ impl Estimator {
         })
     }
 
-    /// Returns the settings in force.
+    /// Returns the settings.
     #[must_use]
     pub fn settings(&self) -> &EstimatorSettings {
         &self.settings
     }
 
-    /// Returns the pose that explains the observations best, with its covariance and the numbers to
-    /// judge it by; whether to trust it is [`Solution::is_trusted`] and `ambiguity`.
+    /// Returns the pose that fits the observations best, with its covariance and the numbers to judge it by:
+    /// [`Solution::is_trusted`] and `ambiguity`.
     ///
-    /// When all points together cannot be trusted and `max_outliers` allows it, the pose is that of
-    /// the fewest exclusions that can; [`Solution::excluded`] names the points left out. When more than one
-    /// choice explains the frame, none is made: the solution of all points is returned, not trusted, and
-    /// [`Solution::unclear`] names two points of which either may be wrong.
+    /// If all points together do not pass the test and `max_outliers` permits it, points are excluded, as few as
+    /// possible; [`Solution::excluded`] names them. If several exclusions explain the frame equally well, none is made:
+    /// the solution of all points is returned, not trusted, and [`Solution::unclear`] names two points of which either
+    /// may be wrong.
     ///
     /// # Inputs
     /// * `observations`: each marker once, in any order, finite, sigmas above zero.
@@ -147,8 +148,8 @@ impl Estimator {
     ///   [`Initialisation::Previous`] only.
     ///
     /// # Errors
-    /// Any [`EstimateError`]: too few points, points that fix no pose, a pixel without a ray, no
-    /// minimum, a marker behind the camera.
+    /// Any [`EstimateError`]: too few points, points that do not determine a pose, a pixel without a ray, no minimum, a
+    /// marker behind the camera.
     pub fn estimate(
         &self,
         camera: &Camera,
@@ -161,7 +162,7 @@ impl Estimator {
         let mut estimate = self.estimate_with_all(camera, observations, previous);
         let is_final = match &estimate {
             Ok(solution) => solution.is_trusted(),
-            // The lens says that there is no such pixel: a fault of the input, not a wrong detection.
+            // A pixel outside the lens model is an invalid input, not a wrong detection.
             Err(error) => matches!(error, EstimateError::NoRay { .. }),
         };
         if !is_final && self.settings.max_outliers > 0 {
@@ -183,7 +184,7 @@ impl Estimator {
         estimate
     }
 
-    /// Looks for the fewest points without which the rest can be trusted.
+    /// Searches for the smallest set of points whose exclusion makes the rest pass the test.
     #[cold]
     fn leave_out(
         &self,
@@ -207,13 +208,13 @@ impl Estimator {
                     exclude::MIN_REMAINING_WITHOUT_PRIOR
                 }
             },
-            // The last attitude may have been a wrong one; the nominal one is the user's word.
+            // The last attitude may be wrong; the nominal one is stated by the user.
             is_prior_sure: self.settings.initialisation != Initialisation::Previous,
         };
         exclude::search(&judge, observations, &suspects, self.settings.max_outliers)
     }
 
-    /// Checks that there are enough points, and enough that check each other.
+    /// Checks that there are enough points, and enough of similar precision to check each other.
     #[inline]
     fn check_count(&self, observations: &[Observation]) -> Result<(), EstimateError> {
         let (got, min_points) = (observations.len(), self.settings.min_points);
@@ -232,7 +233,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// Returns the pose of all these points, or the reason for none.
+    /// Returns the pose of all these points.
     fn estimate_with_all(
         &self,
         camera: &Camera,
@@ -248,7 +249,7 @@ impl Estimator {
         self.solve(&problem, previous)
     }
 
-    /// The same with a budget, which needs room of its own.
+    /// As [`Self::estimate_with_all`], with a budget; separate because of its stack space.
     #[inline(never)]
     fn estimate_in_doubt(
         &self,
@@ -278,7 +279,7 @@ impl Estimator {
             (Initialisation::Previous, Some(seed)) => {
                 match self.solve_from(problem, seed, start) {
                     Ok(solution) if solution.is_trusted() => Ok(solution),
-                    // A tanker that turned meanwhile, or a last pose that was wrong: restart.
+                    // The tanker has turned, or the last pose was wrong: restart from the nominal attitude.
                     _ => nominal(),
                 }
             }
@@ -291,8 +292,8 @@ impl Estimator {
         }
     }
 
-    /// Returns what the prior holds against a hypothesis about wrong points; infinite beyond
-    /// [`MAX_TURN_FROM_PRIOR`], nothing for starts that have no prior.
+    /// Returns the cost of the prior for a hypothesis about wrong points: infinite beyond [`MAX_TURN_FROM_PRIOR`], 0
+    /// for initialisations without a prior.
     fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {
         let prior = match solution.initialisation {
             Initialisation::Nominal => Some(&self.settings.nominal_camera_from_tanker),
@@ -310,8 +311,8 @@ impl Estimator {
         }
     }
 
-    /// Indices of the points that may be left out: all of a few, of many those that fit worst. Without a
-    /// solution they are held against the attitude that is expected, where it suits them best.
+    /// Indices of the points that may be excluded: all if they are few, otherwise those that fit worst. Without a
+    /// solution the fit is judged at the expected attitude, at the position that suits the points best.
     fn suspects(
         &self,
         camera: &Camera,
@@ -353,7 +354,7 @@ impl Estimator {
     ) -> Result<Solution, EstimateError> {
         let minimum = problem.descend(seed)?;
         let fit = problem.fit(&minimum.rotation)?;
-        // The last attitude cannot exclude a rival: it may have been the wrong one of the two.
+        // The last attitude cannot exclude a rival, because it may itself have been the wrong one of the two.
         let prior = (initialisation == Initialisation::Nominal).then_some(seed);
         let cost = |fit: &Fit| fit.chi_squared + squared_turn(&fit.pose.rotation, prior);
         let rival = ambiguity::rival(problem, &fit);
@@ -363,7 +364,7 @@ impl Estimator {
         };
         let judged = Judged {
             fit: best,
-            // The prior chooses, but does not make the choice look surer than the image does.
+            // The prior selects the pose but must not make it look less ambiguous than the image does.
             ambiguity: other.map_or(0.0, |other| {
                 likelihood_ratio(other.chi_squared, best.chi_squared)
             }),
@@ -373,12 +374,12 @@ impl Estimator {
         self.judge(problem, &judged)
     }
 
-    /// The best of all minima in front of the camera, and the second best as its rival.
+    /// Returns the best of all minima in front of the camera, with the second best as its rival.
     fn solve_globally(&self, problem: &Problem) -> Result<Solution, EstimateError> {
         let minima = initialise::search(problem);
         let mut iterations = minima.iterations;
         let mut ranking = Ranking::default();
-        // With every minimum behind the camera, that is the reason.
+        // If every minimum is behind the camera, that is the reason to report.
         let mut failure = minima
             .behind
             .and_then(|minimum| problem.fit(&minimum.rotation).err())
@@ -436,7 +437,7 @@ impl Estimator {
     }
 }
 
-/// Returns the squared turn from a prior attitude in units of [`PRIOR_SIGMA`]; 0 without a prior.
+/// Returns the squared rotation from a prior attitude in units of [`PRIOR_SIGMA`]; 0 without a prior.
 fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
     prior.map_or(0.0, |prior| {
         let turn = UnitQuaternion::from_rotation_matrix(&(found * prior.inverse())).angle();
@@ -444,7 +445,7 @@ fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
     })
 }
 
-/// Returns the pose with a given attitude that suits the points best; `None` where their rays fix no position.
+/// Returns the pose with a given attitude that fits the points best; `None` if their rays do not determine a position.
 fn expected_pose(
     camera: &Camera,
     observations: &[Observation],
@@ -456,9 +457,9 @@ fn expected_pose(
     Some(problem.pose(&problem.placed(attitude)))
 }
 
-/// Returns the points with sigmas that the others can answer for, if some are smaller: none counts as more
-/// precise than [`BOLD_SIGMA_RATIO`] times the `of_count`-th best. Two points far surer than the rest would rule
-/// the pose, and nothing could contradict them.
+/// Returns the points with sigmas raised to a floor, or `None` if no sigma is below it. The floor is the `of_count`-th
+/// smallest sigma over [`BOLD_SIGMA_RATIO`]. Without it, two points with much smaller sigmas than the rest would
+/// dominate the pose, and the other points could not reveal an error of theirs.
 fn with_sigma_floor(
     observations: &[Observation],
     of_count: usize,
@@ -481,12 +482,12 @@ fn with_sigma_floor(
     })
 }
 
-/// Returns whether no sigma is more than `ratio` times another: nearly always.
+/// Returns whether no sigma is more than `ratio` times another, which is the usual case.
 fn are_alike(observations: &[Observation], ratio: f64) -> bool {
     let Some(first) = observations.first() else {
         return true;
     };
-    // Near the first is near each other.
+    // Within √ratio of the first implies within the ratio of each other.
     let (least, largest) = (first.sigma_px / ratio.sqrt(), first.sigma_px * ratio.sqrt());
     let is_near = |seen: &Observation| seen.sigma_px >= least && seen.sigma_px <= largest;
     observations.iter().all(is_near) || {
@@ -496,9 +497,9 @@ fn are_alike(observations: &[Observation], ratio: f64) -> bool {
     }
 }
 
-/// Returns how many points are precise enough to check others: those whose sigma is at most
-/// [`WEAK_SIGMA_RATIO`] times that of the third best. Any three fix a pose; what is much weaker than
-/// they are could not contradict them, so it gives no redundancy.
+/// Returns how many points are precise enough to check others: those whose sigma is at most [`WEAK_SIGMA_RATIO`] times
+/// the third smallest. Any three points determine a pose; much weaker points could not contradict them and add no
+/// redundancy.
 fn count_checking(observations: &[Observation]) -> usize {
     if are_alike(observations, WEAK_SIGMA_RATIO) {
         return observations.len();
@@ -533,7 +534,7 @@ fn dlt_seed(
     linear_rotation(&rays, &markers, &mean(&markers, |marker| marker))
 }
 
-/// The best two of different poses, with their merits.
+/// The best two different poses, with their merits.
 #[derive(Default)]
 struct Ranking {
     best: Option<(Fit, f64)>,

@@ -1,15 +1,16 @@
-//! Wrong detections: leave out as few points as it takes for the rest to agree.
+//! Exclusion of wrong detections: as few points as necessary for the rest to agree.
 //!
-//! With six points, estimators that only weigh large residuals down (Huber, Cauchy, graduated
-//! non-convexity) have too little to go by. All subsets without one point, then all without two, are
-//! few enough to be solved one by one, each from the prior, and judged by the chi-squared test of the
-//! remainder. Two exchanged ids are a hypothesis of their own: it keeps all points, so its test has
-//! four more degrees of freedom than that of two exclusions and tells the right pair more surely. The
-//! pose then still rests on the other points alone: data that had to be corrected are not flown.
+//! With six points, estimators that reduce the weight of large residuals (Huber, Cauchy, graduated non-convexity) have
+//! too little redundancy. The subsets without one point, then those without two, are few enough to be solved one by
+//! one, each from the prior, and judged by the chi-squared test of the remaining points. Two exchanged ids are a
+//! hypothesis of their own: it keeps all points, so its test has four more degrees of freedom than that of two
+//! exclusions and identifies the pair more reliably. The pose is still computed from the other points only: corrected
+//! data are not used for flight.
 //!
-//! The best subset is not enough. Two points that pull the pose the same way can stand for one another, and the
-//! wrong one of them left out is a wrong pose that passes. So a point is left out only if no other choice of as many
-//! points explains the frame within a likelihood ratio of 1000; else the frame is refused as unclear.
+//! Taking the best subset is not sufficient. If two points pull the pose in the same direction, excluding either may
+//! explain the frame, and excluding the wrong one gives a wrong pose that passes. So a point is excluded only if no
+//! other choice of as many points explains the frame within a likelihood ratio of 1000; otherwise the frame is refused
+//! as unclear.
 
 use nalgebra::Isometry3;
 use smallvec::SmallVec;
@@ -19,52 +20,53 @@ use super::lanes::points::INLINE_POINTS;
 use super::{EstimateError, Excluded, Observation, Solution};
 use crate::geometry::pose_error;
 
-/// Returns how many points are suspected at most: those with the largest residuals, so that the cost
-/// stays bounded. Among many points a gross error hardly moves the fit of all, and stands out.
+/// Returns the largest number of suspected points: those with the largest residuals, so that the cost is bounded. Among
+/// many points a gross error hardly changes the fit and has a large residual.
 pub(crate) const fn max_suspects(points: usize) -> usize {
     if points <= 64 { MAX_SUSPECTS } else { 4 }
 }
 const MAX_SUSPECTS: usize = 12;
 const MAX_PAIRS: usize = MAX_SUSPECTS * (MAX_SUSPECTS - 1) / 2;
-/// Indices of points that may be left out.
+/// Indices of points that may be excluded.
 pub(crate) type Suspects = SmallVec<[usize; MAX_SUSPECTS]>;
-/// Some of the points; in place unless they are many.
+/// Some of the points; on the stack unless they are many.
 type Subset = SmallVec<[Observation; INLINE_POINTS]>;
-/// Points that must remain where a prior says what is plausible: fewer leave nothing to judge by.
+/// Points that must remain if a prior determines what is plausible; with fewer there is no redundancy.
 pub(crate) const MIN_REMAINING_WITH_PRIOR: usize = 4;
-/// Points that must remain where nothing does: any four fit some attitude too often. Left and right
-/// exchanged on the whole of a symmetric tanker would pass with two more points left out.
+/// Points that must remain without a prior: any four fit some attitude too often. Detections that are left-right
+/// exchanged on a symmetric tanker would pass with two further points excluded.
 pub(crate) const MIN_REMAINING_WITHOUT_PRIOR: usize = 5;
-/// Difference of two costs below which either choice may be the right one: a likelihood ratio of 1000.
+/// Difference of two costs below which both choices are plausible: a likelihood ratio of 1000.
 const INDISTINCT: f64 = 13.8;
-/// Points beyond those that must remain from which on two wrong ones can be distinguished from one: with a prior, eight points.
+/// Points beyond those that must remain from which on two wrong ones can be distinguished from one: eight points in
+/// total with a prior.
 const SPARE_TO_CHECK_PAIRS: usize = 4;
-/// Squared Mahalanobis distance at which two hypotheses disagree: no correct pair of poses with most
-/// of their points in common is so far apart.
+/// Squared Mahalanobis distance above which two poses are different: correct poses that share most of their points are
+/// never so far apart.
 const ELSEWHERE: f64 = 30.0;
 
 /// How the points of a hypothesis are solved, and how hypotheses are ranked.
 pub(crate) struct Judge<S, P> {
-    /// The pose of some points, judged.
+    /// Solves for the pose of some points, judged.
     pub(crate) solve: S,
-    /// What the prior holds against a pose: a squared distance in sigmas, added to chi-squared.
+    /// The cost of a pose under the prior: a squared distance in sigmas, added to chi-squared.
     pub(crate) prior_cost: P,
     /// Points that must remain.
     pub(crate) min_remaining: usize,
-    /// Whether what the prior excludes is excluded. If the prior may be wrong itself, such poses are not
-    /// chosen, but they still are rivals.
+    /// Whether poses that the prior rules out are discarded. If the prior may itself be wrong, such poses are not
+    /// chosen, but they still count as rivals.
     pub(crate) is_prior_sure: bool,
 }
 
-/// What a search came to.
+/// Result of a search.
 #[expect(
     clippy::large_enum_variant,
     reason = "a box would allocate, and a frame has one of these"
 )]
 pub(crate) enum Found {
-    /// The pose without the points that are wrong.
+    /// The pose without the wrong points.
     Solution(Solution),
-    /// Leaving out either of these explains the frame: something is wrong, and it is not clear what.
+    /// Excluding either of these explains the frame: a detection is wrong, but it is not clear which.
     Unclear(Excluded),
     /// No hypothesis passes.
     Nothing,
@@ -75,8 +77,8 @@ where
     S: Fn(&[Observation]) -> Result<Solution, EstimateError>,
     P: Fn(&Solution) -> f64,
 {
-    /// Returns a hypothesis if its points have a pose that counts. What a sure prior excludes does not; with another
-    /// prior it is a rival, but is not chosen.
+    /// Returns a hypothesis if its points have a pose that is not discarded. What a certain prior rules out is
+    /// discarded; with another prior it is a rival, but is not chosen.
     fn judged(&self, left_out: [usize; 2], solution: &Solution) -> Option<Hypothesis> {
         let cost = solution.chi_squared + (self.prior_cost)(solution);
         let is_plausible = cost.is_finite();
@@ -95,10 +97,10 @@ where
     }
 }
 
-/// Leaves out the fewest points, at most `max_outliers`, for the rest to pass the test; a point is left out only if no
-/// other choice of as many explains the frame nearly as well.
+/// Excludes as few points as possible, at most `max_outliers`, such that the rest passes the test. A point is excluded
+/// only if no other choice of as many explains the frame nearly as well.
 ///
-/// `suspects` are indices of the points that may be left out.
+/// `suspects` are indices of the points that may be excluded.
 pub(crate) fn search<S, P>(
     judge: &Judge<S, P>,
     observations: &[Observation],
@@ -150,9 +152,10 @@ where
     best(judge, observations, &mut scratch, pairs(), preferred)
 }
 
-/// Returns two points that explain the frame better than the one that a solution leaves out, if both are wrong: two
-/// reflections of the same shift agree with each other, and a healthy point can look wrong beside them. That two are
-/// wrong is as much less likely than one as [`INDISTINCT`] says, so their rest must fit better than that of the one.
+/// Returns two points whose joint exclusion explains the frame better than the exclusion that a solution made. Two
+/// reflections with the same shift agree with each other, and a correct point can look wrong beside them. Two wrong
+/// points are less likely than one by about the ratio behind [`INDISTINCT`]: so there is no tolerance, the rest must
+/// fit better than that of the one.
 fn better_pair<S, P>(
     judge: &Judge<S, P>,
     observations: &[Observation],
@@ -178,7 +181,7 @@ where
     })
 }
 
-/// Puts all points but two into `scratch`; the same index twice leaves out one.
+/// Copies all points but two into `scratch`; the same index twice excludes one.
 fn keep_others(observations: &[Observation], [i, j]: [usize; 2], scratch: &mut Subset) {
     scratch.clear();
     let remaining = observations
@@ -188,9 +191,9 @@ fn keep_others(observations: &[Observation], [i, j]: [usize; 2], scratch: &mut S
     scratch.extend(remaining.map(|(_, seen)| *seen));
 }
 
-/// A hypothesis about what is wrong, with the pose of the rest.
+/// A hypothesis about which points are wrong, with the pose of the rest.
 struct Hypothesis {
-    /// Chi-squared and what the prior holds against the pose.
+    /// Chi-squared plus the cost of the prior.
     cost: f64,
     chi_squared: f64,
     /// Whether the rest passes the test.
@@ -201,7 +204,7 @@ struct Hypothesis {
     camera_from_tanker: Isometry3<f64>,
 }
 
-/// Returns the hypothesis with the least cost of those that may be chosen.
+/// Returns the hypothesis with the least cost among those that may be chosen.
 fn least(hypotheses: &[Hypothesis]) -> Option<&Hypothesis> {
     hypotheses
         .iter()
@@ -217,9 +220,9 @@ fn rival_choice<'a>(hypotheses: &'a [Hypothesis], first: &Hypothesis) -> Option<
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// The choice with the least cost among those that leave out one of these pairs (the same index twice: one point), or
-/// the preferred one if its rest passes. Another pose that passes is its rival; how likely that is, is the image's to
-/// say.
+/// Returns the choice with the least cost among those that exclude one of these pairs (the same index twice: one
+/// point), or the preferred one if its rest passes. Another pose that passes is its rival; its likelihood is judged by
+/// the image alone.
 fn best<S, P>(
     judge: &Judge<S, P>,
     observations: &[Observation],
@@ -250,7 +253,7 @@ where
     {
         return Found::Unclear(between(observations, first, other));
     }
-    // Solved once more: cheaper than to keep every solution.
+    // Solving again is cheaper than keeping every solution.
     let [i, j] = first.left_out;
     let Some(mut best) = solve(first.left_out) else {
         return Found::Nothing;
@@ -268,7 +271,7 @@ where
     Found::Solution(best)
 }
 
-/// Returns a point of each of two choices, those in which they differ.
+/// Returns one point from each of two choices, from those in which they differ.
 fn between(observations: &[Observation], first: &Hypothesis, other: &Hypothesis) -> Excluded {
     let only_in = |a: &Hypothesis, b: &Hypothesis| {
         let point = a.left_out.iter().find(|i| !b.left_out.contains(i));

@@ -1,7 +1,7 @@
-//! A pose from known markers: pixels have been checked, a pose has not yet become a track.
+//! Pose estimation from known markers in one image.
 //!
-//! Knows `geometry` and `camera`; never a clock, a file, a topic or the last frame (the last attitude
-//! is an argument). One frame goes straight through:
+//! Depends on `geometry` and `camera`, and not on clocks, files, topics or the last frame (the last attitude is an
+//! argument). The steps of one frame:
 //!
 //! ```text
 //! observations -> rays -> quadratic cost -> seed rotation -> Newton to its minimum
@@ -47,21 +47,21 @@ pub(crate) use estimator::PRIOR_SIGMA;
 pub use initialise::linear_rotation;
 pub use orthogonal_iteration::{Iterated, fixed_point, iterate_accelerated, iterate_literally};
 
-/// Where the iteration starts.
+/// How the iteration is started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Initialisation {
     /// `In_M2`: the nominal attitude. At least 3 points.
     Nominal,
     /// `In_M1`: the linear camera matrix. At least 6 points, not in one plane.
     Dlt,
-    /// The last trusted attitude, or the nominal one where there is none or it gives no pose. At least 3 points.
+    /// The last trusted attitude; the nominal one if there is none or no pose results from it. At least 3 points.
     Previous,
     /// No prior: the best of all attitudes. At least 4 points.
     Global,
 }
 
 impl Initialisation {
-    /// Returns how many points this start needs.
+    /// Returns how many points this initialisation needs.
     #[must_use]
     pub fn min_points(self) -> usize {
         match self {
@@ -72,41 +72,40 @@ impl Initialisation {
     }
 }
 
-/// Which estimate is wanted.
+/// Which estimate is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Refinement {
     /// The pose with the least squared pixel residuals over their variances.
     MaximumLikelihood,
-    /// The paper's: the converged orthogonal iteration as it is.
+    /// The paper's: the converged orthogonal iteration.
     None,
 }
 
-/// How a pose is found and judged.
+/// Settings of the estimator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatorSettings {
-    /// Where the iteration starts.
+    /// How the iteration is started.
     pub initialisation: Initialisation,
-    /// Which estimate is wanted.
+    /// Which estimate is computed.
     pub refinement: Refinement,
     /// Rotation part of the expected `camera_from_tanker`.
     pub nominal_camera_from_tanker: Rotation3<f64>,
-    /// Fewer points give no pose, nor do fewer whose sigma is at most five times that of the third
-    /// best; the initialisation may need more. From 5 on no sigma counts as less than half of that of the
-    /// point at this place, best first.
+    /// Least number of points, and least number of points whose sigma is at most five times the third smallest; the
+    /// initialisation may need more. From 5 on, sigmas below half the `min_points`-th smallest are raised to that.
     pub min_points: usize,
     /// At most this many points may be excluded as wrong, 0 to 2.
     pub max_outliers: usize,
-    /// Probability with which a correct frame passes the chi-squared test, 0 to 1.
+    /// Probability that a correct frame passes the chi-squared test, 0 to 1.
     pub trust_probability: f64,
-    /// A rival pose at least this likely means refusal, 0 to 1; 1 or more: never.
+    /// Frames with a rival pose of at least this likelihood are refused, 0 to 1; 1 or more: never.
     pub max_ambiguity: f64,
-    /// Standard deviation of the attitude about the nominal one, each axis, rad; `None`: nothing is known of it.
+    /// Standard deviation of the attitude about the nominal one, each axis, rad; `None`: no prior.
     pub attitude_sigma_rad: Option<f64>,
 }
 
 impl Default for EstimatorSettings {
-    /// The node's: aligned airframes, a camera that looks straight ahead, maximum likelihood; of five points or
-    /// more one may be wrong, and no second pose may come near. A test holds the table of parameters to it.
+    /// The node's defaults: aligned airframes, a camera that looks straight ahead, maximum likelihood, one exclusion
+    /// from five points on, no tolerated second pose. A test compares them with the table of parameters.
     fn default() -> Self {
         Self {
             initialisation: Initialisation::Nominal,
@@ -121,21 +120,21 @@ impl Default for EstimatorSettings {
     }
 }
 
-/// One marker as an image shows it. Values are checked by the caller: finite, `sigma_px > 0`, ids unique.
+/// The observation of one marker in an image. Values are checked by the caller: finite, `sigma_px > 0`, ids unique.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// Marker id, for naming the point.
+    /// Marker id.
     pub id: u32,
-    /// Where the marker sits, tanker frame, m.
+    /// Position of the marker, tanker frame, m.
     pub marker_in_tanker: Point3<f64>,
-    /// Where the image shows it.
+    /// Detected position in the image.
     pub pixel: Pixel,
     /// Standard deviation of column and of row, px.
     pub sigma_px: f64,
 }
 
 impl Observation {
-    /// Returns predicted minus seen pixel, px; `None` where the marker has no pixel at this pose.
+    /// Returns predicted minus detected pixel, px; `None` if the marker has no pixel at this pose.
     #[must_use]
     pub fn residual_px(
         &self,
@@ -154,44 +153,44 @@ impl Observation {
     }
 }
 
-/// A pose with all that is needed to judge it.
+/// A pose with the numbers to judge it by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// The tanker's pose in the camera optical frame.
     pub camera_from_tanker: Isometry3<f64>,
-    /// Covariance of that pose, from the given sigmas, never from the residuals.
+    /// Covariance of that pose, from the stated sigmas, not from the residuals.
     pub covariance: PoseCovariance,
     /// Root mean square over all columns and rows of the used points' residuals, px.
     pub rms_px: f64,
     /// Sum of the squared residuals over their variances.
     pub chi_squared: f64,
-    /// Of `chi_squared`: `2 n − 6`.
+    /// Degrees of freedom of `chi_squared`: `2 n − 6`.
     pub degrees_of_freedom: u16,
-    /// The largest `chi_squared` to trust.
+    /// The largest `chi_squared` that passes the test.
     pub chi_squared_limit: f64,
-    /// Of all solver stages together, but for descents that were given up.
+    /// Iterations of all solver stages, without descents that were abandoned.
     pub iterations: u16,
-    /// Where the iteration really started.
+    /// The initialisation that was used in the end.
     pub initialisation: Initialisation,
-    /// Likelihood of the best rival pose in front of the camera over that of this one, at most 1; 0: no
-    /// rival. From the image alone, whatever the prior says.
+    /// Likelihood of the best rival pose in front of the camera relative to this one, at most 1; 0: no rival. From the
+    /// image alone, without the prior.
     pub ambiguity: f64,
-    /// Points left out as wrong.
+    /// Points excluded as wrong.
     pub excluded: Excluded,
-    /// `chi_squared` of the fit of all points, before any were left out; infinite where they had none.
+    /// `chi_squared` of the fit of all points, before any exclusion; infinite if they have no fit.
     pub chi_squared_of_all: f64,
-    /// Two points of which either may be wrong; empty unless one is and it is not clear which.
+    /// Two points of which either may be wrong; empty unless the frame is unclear.
     pub unclear: Excluded,
 }
 
 impl Solution {
-    /// Returns predicted minus seen pixel, px; `None` where the marker has no pixel at this pose.
+    /// Returns predicted minus detected pixel, px; `None` if the marker has no pixel at this pose.
     #[must_use]
     pub fn residual_px(&self, camera: &Camera, seen: &Observation) -> Option<Vector2<f64>> {
         seen.residual_px(camera, &self.camera_from_tanker)
     }
 
-    /// Returns chi-squared of the fit of all points with its degrees of freedom, whether or not any were left out.
+    /// Returns chi-squared of the fit of all points with its degrees of freedom, with or without exclusions.
     #[must_use]
     pub fn of_all_points(&self) -> (f64, u16) {
         let left_out = u16::try_from(self.excluded.ids().count()).unwrap_or(0);
@@ -199,14 +198,14 @@ impl Solution {
         (self.chi_squared_of_all, degrees_of_freedom)
     }
 
-    /// Returns whether the residuals are as small as the sigmas promise.
+    /// Returns whether the residuals agree with the sigmas.
     #[must_use]
     pub fn is_trusted(&self) -> bool {
         self.chi_squared <= self.chi_squared_limit
     }
 }
 
-/// Ids of the points that a solution leaves out: none, one or two.
+/// Ids of the points that a solution excludes: at most two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Excluded([Option<u32>; 2]);
 
@@ -216,58 +215,58 @@ impl Excluded {
         self.0.into_iter().flatten()
     }
 
-    /// Returns whether a point was left out.
+    /// Returns whether a point was excluded.
     #[must_use]
     pub fn contains(&self, id: u32) -> bool {
         self.0.contains(&Some(id))
     }
 }
 
-/// Why no pose can be given. A poor pose is not an error: see [`Solution`].
+/// Why there is no pose. A poor pose is not an error: see [`Solution`].
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EstimateError {
     /// Fewer points than the solver needs.
     #[error("expected at least {need} points, got {got}")]
     TooFewPoints {
-        /// Points at hand.
+        /// Number of points.
         got: usize,
-        /// Points needed.
+        /// Number of points needed.
         need: usize,
     },
-    /// Enough points, but too few that are precise enough to check each other.
+    /// Enough points, but too few of similar precision to check each other.
     #[error(
-        "expected at least {need} points of similar sigma, got {precise} of {got}: sigmas above five times the third best check nothing"
+        "expected at least {need} points of similar sigma, got {precise} of {got}: sigmas above five times the third best are not counted"
     )]
     TooFewPrecisePoints {
-        /// Points whose sigma is near that of the best.
+        /// Number of points whose sigma is similar to the best ones.
         precise: usize,
-        /// Points at hand.
+        /// Number of points.
         got: usize,
-        /// Points needed.
+        /// Number of points needed.
         need: usize,
     },
-    /// A pixel that the lens model cannot turn into a ray.
+    /// A pixel for which the lens model has no ray.
     #[error("id {id}: {cause}")]
     NoRay {
         /// Its marker id.
         id: u32,
-        /// Why.
+        /// The reason.
         cause: UndistortError,
     },
-    /// The points cannot fix a pose.
+    /// The points do not determine a pose.
     #[error("expected points that determine a pose, but {reason}")]
     Degenerate {
-        /// What is wrong with them.
+        /// The reason.
         reason: &'static str,
     },
-    /// No minimum found.
+    /// The solver did not converge.
     #[error("expected the solver to converge, but it did not within {iterations} iterations")]
     NoConvergence {
-        /// Iterations of the stage that gave up.
+        /// Iterations of the stage that failed.
         iterations: u16,
     },
-    /// The best fit puts a marker behind the lens.
+    /// The best fit has a marker behind the camera.
     #[error(
         "expected every marker in front of the camera, but the best fit puts id {id} at depth {} m",
         crate::text::digits(*depth_m)

@@ -8,7 +8,7 @@ use super::lanes::four::{Arithmetic, Kernel, vectorised};
 use super::lanes::symmetric3::{positive_inverse, times};
 use crate::geometry::{axial, cayley};
 
-/// Where a descent ended.
+/// End point of a descent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Minimum {
     pub(crate) rotation: Rotation3<f64>,
@@ -17,27 +17,27 @@ pub(crate) struct Minimum {
     pub(crate) converged: bool,
 }
 
-/// Steps after which a descent is given up; from a prior four are usual, from anywhere about ten.
+/// Limit of steps; from a prior four are usual, from arbitrary starts about ten.
 const MAX_ITERATIONS: u16 = 60;
-/// rad; a longer step leaves the region in which the quadratic model says anything.
+/// rad; longest step, since the quadratic model is not valid beyond it.
 const MAX_STEP: f64 = 0.8;
-/// Halvings that bring the longest step under [`TRUSTED_STEP`]; more would mean a cost that is not a number.
+/// Halvings that reduce the longest step below [`TRUSTED_STEP`]; more are only needed for a cost that is NaN.
 const MAX_HALVINGS: usize = 14;
-/// rad; a shorter step is in the quadratic regime, where the cost is too flat to tell its descent from rounding.
+/// rad; shorter steps are taken without a check: so close to the minimum, the decrease of the cost is below rounding.
 const TRUSTED_STEP: f64 = 1e-4;
 
-/// rad; the quadratic model is asked how far down a longer step would lead, but not believed.
+/// rad; above this length the decrease that the quadratic model predicts is not used.
 const PROMISING_STEP: f64 = 0.3;
-/// Share of the cost that a promise may be: the model is off by a share of the cost, whatever the limit. In a million
-/// frames no minimum that counts was given up; with 0.25 a few were.
+/// Largest predicted decrease that is used, relative to the cost: the error of the model is proportional to the cost.
+/// With this value no relevant minimum was abandoned in a million frames; with 0.25 a few were.
 const CREDIBLE_GAIN: f64 = 0.1;
-/// How often the promised minimum must exceed a limit to give a descent up.
+/// A descent is abandoned if the predicted minimum exceeds the limit by this factor.
 const HOPELESS: f64 = 5.0;
 
 /// Returns the local minimum of `E(R)` in whose basin `seed` lies.
 ///
-/// It stops after a step shorter than `step_tolerance` (rad); convergence is quadratic, so the
-/// error that remains is about the square of that.
+/// Stops after a step shorter than `step_tolerance` (rad). Convergence is quadratic, so the remaining error is about
+/// the square of that.
 ///
 /// # Source
 /// Steps `R ← R cay(w)`; with `Y = mat(Ω r)`, `A = Rᵀ Y` half the gradient is the axial vector of
@@ -55,8 +55,8 @@ pub(crate) fn minimise(
     })
 }
 
-/// Returns the same as [`minimise`], or none as soon as the minimum will clearly lie above `limit`:
-/// where a full Newton step promises to end [`HOPELESS`] times higher.
+/// As [`minimise`], but returns `None` as soon as the minimum will clearly be above `limit`: if the predicted end of a
+/// full Newton step is [`HOPELESS`] times higher.
 pub(crate) fn minimise_below(
     cost: &CollinearityCost,
     seed: &Rotation3<f64>,
@@ -131,7 +131,7 @@ fn descend<A: Arithmetic>(arithmetic: A, descent: &Descent) -> Option<Minimum> {
     Some(ended(&here, MAX_ITERATIONS, false))
 }
 
-/// A rotation with the cost there.
+/// A rotation with its cost and gradient.
 #[derive(Clone, Copy)]
 struct Place<A: Arithmetic> {
     rotation: Columns<A>,
@@ -155,8 +155,8 @@ impl<A: Arithmetic> Place<A> {
     }
 }
 
-/// A step, and by how much the quadratic model says it lowers the cost; no promise where that model
-/// has no minimum near.
+/// A step, and the decrease of the cost that the quadratic model predicts; no prediction if that model has no minimum
+/// nearby.
 struct NewtonStep {
     step: Vector3<f64>,
     promise: Option<f64>,
@@ -196,12 +196,12 @@ fn solve_positive(h: &Matrix3<f64>, g: &Vector3<f64>) -> Option<Vector3<f64>> {
     Some(Vector3::from(times(&inverse, [g.x, g.y, g.z])))
 }
 
-/// Solves with the Hessian, lifted until it is positive definite so that the step descends.
+/// Solves with the Hessian, with its diagonal raised until it is positive definite, so that the step descends.
 #[cold]
 fn solve_lifted(hessian: &Matrix3<f64>, gradient: &Vector3<f64>) -> Vector3<f64> {
     let scale = hessian.norm().max(f64::MIN_POSITIVE);
     let mut lift = 0.01 * scale;
-    // Doubling ends at the latest when the lift exceeds the matrix norm; of one that is infinite it would not.
+    // Doubling ends at the latest when the shift exceeds the matrix norm. It would not end for an infinite matrix.
     while scale.is_finite() && lift <= 8.0 * scale {
         if let Some(solution) = solve_positive(&(hessian + Matrix3::identity() * lift), gradient) {
             return solution;

@@ -1,8 +1,8 @@
-//! Orthogonal iteration, literally as in the paper, and accelerated with the quadratic form `Ω`.
+//! Orthogonal iteration: literally as in the paper, and accelerated with the quadratic form `Ω`.
 //!
-//! Both take the same steps. The literal form is the reference; the accelerated one costs the same
-//! for six points as for a thousand. The estimator itself goes to the same fixed point by Newton's
-//! method ([`super::newton`]), in fewer steps.
+//! Both take the same steps. The literal form is the reference; the accelerated one has the same cost for six points as
+//! for a thousand. The estimator itself finds the same fixed point by Newton's method ([`super::newton`]), in fewer
+//! steps.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -15,7 +15,7 @@ use super::newton::{self, Minimum};
 use crate::camera::Ray;
 use crate::geometry::{chord, nearest_rotation, nearest_rotation_by_svd};
 
-/// Where an orthogonal iteration ended.
+/// End point of an orthogonal iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct Iterated {
     /// The pose after the last step.
@@ -26,13 +26,13 @@ pub struct Iterated {
     pub converged: bool,
 }
 
-/// Returns the pose after orthogonal iteration by the paper's own steps.
+/// Returns the pose after orthogonal iteration with the steps of the paper.
 ///
-/// Each step solves the translation in closed form (Eq. 13), puts every point onto its ray, and
-/// solves the rotation by absolute orientation (Lemma 1). It stops when a step turns by less than
-/// `tolerance_rad`, or after `max_iterations`.
+/// Each step computes the translation in closed form (Eq. 13), projects every point onto its ray, and computes the
+/// rotation by absolute orientation (Lemma 1). It stops when a step turns by less than `tolerance_rad`, or after
+/// `max_iterations`.
 ///
-/// DIFFERENCE: the paper stops when `E < ε`; `E` depends on the noise, so the change decides here.
+/// DIFFERENCE: the paper stops when `E < ε`; `E` depends on the noise, so the size of the step is used here.
 ///
 /// # Inputs
 /// * `rays`: `n ≥ 3` undistorted points on the `z = 1` plane.
@@ -40,7 +40,7 @@ pub struct Iterated {
 /// * `seed`: the rotation part of a first `camera_from_tanker`.
 ///
 /// # Errors
-/// [`EstimateError::TooFewPoints`], or [`EstimateError::Degenerate`] when the rays fix no position.
+/// [`EstimateError::TooFewPoints`], or [`EstimateError::Degenerate`] if the rays do not determine a position.
 ///
 /// # Source
 /// Ding, Wei, Wang 2011, Eqs. (5)–(8), (11)–(13); Lu, Hager, Mjolsness, *PAMI* 22(6), 2000.
@@ -103,7 +103,7 @@ pub fn iterate_literally(
     ))
 }
 
-/// Returns the same as [`iterate_literally`], at a cost for each step that does not grow with `n`.
+/// As [`iterate_literally`], at a cost per step that does not grow with `n`.
 ///
 /// One step is `R ← nearest rotation to (R S − mat(Ω vec R))`, `S = Σ p pᵀ` over centred points.
 ///
@@ -146,7 +146,7 @@ pub fn fixed_point(
     markers_in_tanker: &[Point3<f64>],
     seed: &Rotation3<f64>,
 ) -> Result<Iterated, EstimateError> {
-    /// rad; the next step would be about its square.
+    /// rad; the error is about its square.
     const STEP_TOLERANCE: f64 = 1e-7;
     check(rays, markers_in_tanker)?;
     let (cost, p_mean) = cost(rays, markers_in_tanker)?;

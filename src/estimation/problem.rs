@@ -1,4 +1,4 @@
-//! One frame's problem, prepared: points about their mean, the quadratic cost, fits from a seed.
+//! One prepared frame: points about their mean, the quadratic cost, and fits from a seed.
 
 use nalgebra::{Isometry3, Matrix6, Rotation3};
 
@@ -13,19 +13,19 @@ use super::residuals::{LensResiduals, PinholeResiduals};
 use super::{EstimateError, Observation, Refinement, newton};
 use crate::camera::Camera;
 
-/// rad; a start for maximum likelihood needs no more: Newton's error is about the square of its step.
+/// rad; sufficient for the start of maximum likelihood: the error after Newton's step is about its square.
 const START_TOLERANCE: f64 = 0.03;
-/// rad; convergence is quadratic, so the fixed point is then met to rounding.
+/// rad; convergence is quadratic, so the fixed point is then exact to rounding.
 const FIXED_POINT_TOLERANCE: f64 = 1e-7;
-/// Chi-squared above that of the chosen pose at which a rival no longer counts: its likelihood is
-/// under 1e-13 of the chosen one's.
+/// Chi-squared above that of the chosen pose at which a rival is negligible: its likelihood is below 1e-13 of the
+/// chosen one's.
 pub(crate) const NEGLIGIBLE: f64 = 60.0;
 
-/// Share of the chi-squared that one step promises which a fit certainly does not fall below. Far from a minimum a step
-/// promises too much or too little; a quarter was once too bold for the descent of the cost.
+/// Share of the predicted decrease of chi-squared used as a lower bound of a fit. Far from a minimum a step predicts
+/// too much or too little; a quarter proved too large for the descent of the cost.
 const SURE_SHARE: f64 = 0.1;
 
-/// A frame with its camera: what every start and every rival pose shares.
+/// A frame with its camera, as shared by all starts and rival poses.
 #[derive(Debug)]
 pub(crate) struct Problem<'a> {
     pub(crate) camera: &'a Camera,
@@ -33,11 +33,11 @@ pub(crate) struct Problem<'a> {
     pub(crate) observations: &'a [Observation],
     pub(crate) points: Points<'a>,
     pub(crate) cost: &'a CollinearityCost,
-    /// What else than noise the pixels may have wrong; none: nothing.
+    /// The error budget of the frame's points, if any.
     doubts: Option<&'a FrameBudget>,
 }
 
-/// Where a problem's numbers stand: seven kilobytes that are filled in place and never moved.
+/// Storage of a problem: seven kilobytes that are filled in place and never moved.
 pub(crate) struct Room {
     blocks: Blocks,
     cost: CollinearityCost,
@@ -53,7 +53,7 @@ impl Room {
     }
 }
 
-/// From pixels to the cost.
+/// The step from pixels to the cost.
 struct Preparation<'a, 'b> {
     camera: &'a Camera,
     observations: &'a [Observation],
@@ -97,8 +97,7 @@ impl Kernel for PinholeFit<'_> {
 }
 
 impl<'a> Problem<'a> {
-    /// Returns the problem with the quadratic cost of the paper, or the one nearest to maximum
-    /// likelihood.
+    /// Returns the problem with the paper's quadratic cost, or with the one that approximates maximum likelihood.
     pub(crate) fn new(
         camera: &'a Camera,
         refinement: Refinement,
@@ -127,7 +126,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Returns the same problem with a budget that has been filled for its points.
+    /// Returns the problem with a budget that has been filled for its points.
     pub(crate) fn in_doubt(self, doubts: &'a FrameBudget) -> Self {
         Self {
             doubts: Some(doubts),
@@ -144,12 +143,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns how many degrees of freedom the residuals have, those of a prior included.
+    /// Returns the degrees of freedom of the residuals, including those of a prior.
     pub(crate) fn degrees_of_freedom(&self) -> usize {
         2 * self.observations.len() - 6 + self.doubts.map_or(0, FrameBudget::degrees_of_freedom)
     }
 
-    /// Returns the step, rad, under which a minimum of the cost is near enough.
+    /// Returns the step length, rad, at which a minimum of the cost is accurate enough.
     pub(crate) fn step_tolerance(&self) -> f64 {
         match self.refinement {
             Refinement::None => FIXED_POINT_TOLERANCE,
@@ -169,15 +168,15 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the minimum in whose basin `seed` lies; `None` when there is none, or when chi-squared
-    /// there will clearly exceed a limit.
+    /// Returns the minimum in whose basin `seed` lies; `None` without one, or if chi-squared there will clearly exceed
+    /// a limit.
     pub(crate) fn descend_below(
         &self,
         seed: &Rotation3<f64>,
         chi_squared: f64,
     ) -> Option<newton::Minimum> {
         let limit = match self.refinement {
-            // The cost knows nothing of the budget, by which chi-squared may be far less.
+            // The cost does not include the budget, with which chi-squared may be far smaller.
             _ if self.doubts.is_some() => f64::INFINITY,
             Refinement::None => f64::INFINITY,
             Refinement::MaximumLikelihood => {
@@ -189,7 +188,7 @@ impl<'a> Problem<'a> {
             .filter(|minimum| minimum.converged)
     }
 
-    /// Returns the final pose from a minimum of the cost, every point in front of the camera.
+    /// Returns the final pose from a minimum of the cost, with every point in front of the camera.
     pub(crate) fn fit(&self, rotation: &Rotation3<f64>) -> Result<Fit, EstimateError> {
         let start = self.placed(rotation);
         let mut fit = match (self.refinement, self.doubts) {
@@ -232,7 +231,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the pose with this rotation that suits the points best.
+    /// Returns the pose with this rotation that fits the points best.
     #[inline]
     pub(crate) fn placed(&self, rotation: &Rotation3<f64>) -> CentredPose {
         CentredPose {
@@ -255,7 +254,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Returns chi-squared and the squared residuals, px², at a pose; `None` where a point has no pixel there.
+    /// Returns chi-squared and the squared residuals, px², at a pose; `None` if a point has no pixel there.
     fn chi_squared_at(&self, pose: &CentredPose) -> Option<(f64, f64)> {
         match self.doubts {
             Some(budget) => self.doubt(budget).at(*pose),
@@ -276,7 +275,7 @@ impl<'a> Problem<'a> {
         pose.about_origin(&(pose.rotation * self.points.mean.coords))
     }
 
-    /// What "best" means: each refinement minimises its own error.
+    /// The quantity that is least for the best fit; each refinement minimises its own error.
     pub(crate) fn merit(&self, fit: &Fit) -> f64 {
         match self.refinement {
             Refinement::MaximumLikelihood => fit.chi_squared,
@@ -284,21 +283,21 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns by how much chi-squared rises when a fit is turned to another attitude, at the position that
-    /// suits it best; `None` where a point has no pixel there.
+    /// Returns the increase of chi-squared when a fit is turned to another attitude, at the best position for it;
+    /// `None` if a point has no pixel there.
     pub(crate) fn rise(&self, fit: &Fit, rotation: &Rotation3<f64>) -> Option<f64> {
         let rise = match (self.refinement, self.doubts) {
             (Refinement::MaximumLikelihood, Some(budget)) => {
                 let there = self.placed(rotation);
                 self.doubt(budget).with_attitude(there)? - fit.chi_squared
             }
-            // The cost is chi-squared times squared depths, to first order.
+            // To first order, the cost is chi-squared times the squared depths.
             (Refinement::MaximumLikelihood, None) => {
                 let depth = fit.pose.centre_in_camera.z;
                 let cost = |rotation| self.cost.value(Plain, rotation);
                 (cost(rotation) - cost(&fit.pose.rotation)) / (depth * depth)
             }
-            // The paper's cost knows nothing of the noise.
+            // The paper's cost is not weighted by the noise.
             (Refinement::None, _) => {
                 let there = self.placed(rotation);
                 self.chi_squared_at(&there)?.0 - fit.chi_squared
@@ -307,10 +306,10 @@ impl<'a> Problem<'a> {
         Some(rise.max(0.0))
     }
 
-    /// Returns a bound from below for chi-squared in the basin of a minimum of the cost; `None` for the
-    /// paper's cost, which is not weighted by the noise.
+    /// Returns a lower bound of chi-squared in the basin of a minimum of the cost; `None` for the paper's cost, which
+    /// is not weighted by the noise.
     ///
-    /// The cost is the sum of squared whitened residuals times squared depths, to first order.
+    /// To first order, the cost is the sum of squared whitened residuals times squared depths.
     pub(crate) fn least_chi_squared(&self, minimum: &newton::Minimum) -> Option<f64> {
         if let Some(budget) = self.doubts {
             let promised = self.doubt(budget).promised(self.placed(&minimum.rotation));
@@ -322,9 +321,9 @@ impl<'a> Problem<'a> {
             .then_some(minimum.cost / (largest_depth * largest_depth))
     }
 
-    /// Returns the cost above which a minimum does not count next to this one: its likelihood is negligible.
-    /// Infinite for the paper's cost, which is not weighted by the noise, with a budget, which it does not know, and next to a minimum that may turn
-    /// out to be none, with a marker behind the camera.
+    /// Returns the cost above which a minimum is negligible next to this one. Infinite for the paper's cost, which is
+    /// not weighted by the noise; with a budget, which the cost does not include; and next to a minimum that may be
+    /// discarded because a marker is behind the camera.
     pub(crate) fn negligible_cost(&self, best: &newton::Minimum) -> f64 {
         let (depth, radius) = (
             self.cost.centre_in_camera(&best.rotation).z,
@@ -342,7 +341,7 @@ impl<'a> Problem<'a> {
 
     fn check_in_front(&self, pose: &CentredPose) -> Result<(), EstimateError> {
         if pose.centre_in_camera.z > self.points.radius {
-            return Ok(()); // no turn brings a marker behind
+            return Ok(()); // no rotation puts a marker behind the camera
         }
         for seen in self.observations {
             let arm = pose.rotation * (seen.marker_in_tanker - self.points.mean);
@@ -364,7 +363,7 @@ impl<'a> Problem<'a> {
             FitFailure::NotConverged => EstimateError::NoConvergence {
                 iterations: refine::MAX_ITERATIONS,
             },
-            // In front, yet without a pixel: the lens model does not reach there.
+            // In front but without a pixel: outside the lens model's valid region.
             FitFailure::StartNotVisible => self
                 .check_in_front(start)
                 .err()

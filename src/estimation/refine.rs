@@ -1,31 +1,31 @@
 //! Maximum likelihood: the pose with the least sum of squared pixel residuals over their variances.
 //!
-//! Gauss-Newton on a left rotation increment and the position of the markers' mean, with the lens
-//! model evaluated at the prediction, so that a distorted image is fitted where its noise lives.
-//! Steps that do not descend are damped (Levenberg-Marquardt).
+//! Gauss-Newton on a left rotation increment and the position of the markers' mean. The lens model is evaluated at the
+//! prediction, so that the residuals are in the pixels of the distorted image, in which the noise is stated. Steps that
+//! do not descend are damped (Levenberg-Marquardt).
 
 use super::centred_pose::CentredPose;
 use super::lanes::information::{Solver, Vector};
 use super::residuals::{Residuals, Slope};
 
-/// Steps after which a fit is given up; two or three are usual.
+/// Limit of steps; two or three are usual.
 pub(crate) const MAX_ITERATIONS: u16 = 50;
-/// Predicted gain in chi-squared at which the fit has converged: a thousandth of a sigma, squared.
+/// Predicted decrease of chi-squared at which the fit has converged: a thousandth of a sigma, squared.
 const GAIN_TOLERANCE: f64 = 1e-6;
-/// Share of chi-squared below which a gain is rounding; decides only where residuals are thousands of sigmas.
+/// Share of chi-squared below which a decrease is rounding; matters only with residuals of thousands of sigmas.
 const ROUNDING: f64 = 1e-12;
-/// Damping at which no step in any direction helps any more.
+/// Damping above which no step helps.
 const MAX_DAMPING: f64 = 1e9;
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fit {
     pub(crate) pose: CentredPose,
     pub(crate) chi_squared: f64,
     /// px², over columns and rows.
     pub(crate) squared_residuals_px: f64,
-    /// The factored information `JᵀΣ⁻¹J`, rotation before position of the mean; `None` for the paper's own
-    /// estimate, whose covariance is not the inverse of a curvature.
+    /// The factored information `JᵀΣ⁻¹J`, rotation before position of the mean; `None` for the paper's estimate, whose
+    /// covariance is not the inverse of a curvature.
     pub(crate) solver: Option<Solver>,
     pub(crate) iterations: u16,
 }
@@ -33,7 +33,7 @@ pub(crate) struct Fit {
 /// Why a fit failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FitFailure {
-    /// The start leaves a point without a pixel: behind the camera, or outside the lens model.
+    /// A point has no pixel at the start: behind the camera, or outside the lens model.
     StartNotVisible,
     /// The information matrix is singular.
     Singular,
@@ -43,7 +43,7 @@ pub(crate) enum FitFailure {
 /// Returns the maximum likelihood pose that descent from `start` reaches, with its factored information.
 ///
 /// # Inputs
-/// * `explain`: makes an error of a failure.
+/// * `explain`: converts a failure into an error.
 ///
 /// # Source
 /// `D = (1/z) [fx 0 −fx x; 0 fy −fy y]` for a pinhole, the lens model's derivative times
@@ -64,7 +64,7 @@ pub(crate) fn maximum_likelihood<E, R: Residuals>(
     for iteration in 1..=MAX_ITERATIONS {
         let Some(solver) = here.information.damped(damping).solver() else {
             if damping == 0.0 && iteration > 1 {
-                // Not singular at the start: a bad step led here. Damp it.
+                // The start was not singular, so a bad step led here: damp it.
                 damping = 1e-3;
                 continue;
             }
@@ -79,7 +79,7 @@ pub(crate) fn maximum_likelihood<E, R: Residuals>(
         if damping > 0.0
             && let Some(undamped) = here.information.solver()
         {
-            // In a valley more curved than its slopes tell, full steps would overshoot for ever.
+            // In a strongly curved valley full steps would overshoot indefinitely.
             let gradient = &here.slope.gradient;
             let gain = dot(&undamped.solve(gradient), gradient);
             if gain < GAIN_TOLERANCE.max(ROUNDING * here.slope.chi_squared) {
@@ -124,7 +124,7 @@ fn finish(
     iterations: u16,
 ) -> Option<Fit> {
     let chi_squared = (here.chi_squared - gain).max(0.0);
-    // The last step changes both sums alike; it is too short to be worth another look at the points.
+    // The last step changes both sums by the same factor; it is too short to justify another pass over the points.
     let share = if here.chi_squared > 0.0 {
         chi_squared / here.chi_squared
     } else {
@@ -147,7 +147,7 @@ fn dot(a: &Vector, b: &Vector) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Returns chi-squared and the squared residuals in px² at a pose; `None` when a point has no pixel there.
+/// Returns chi-squared and the squared residuals in px² at a pose; `None` if a point has no pixel there.
 pub(crate) fn squared_residuals(
     residuals: &impl Residuals,
     pose: &CentredPose,

@@ -1,8 +1,8 @@
-//! Limits of the chi-squared test that separates a frame to trust from one to refuse.
+//! Limits of the chi-squared test that decides whether a frame is trusted.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// Degrees of freedom whose limit is kept ready; beyond them an approximation is as good.
+/// Degrees of freedom with a tabulated limit; beyond them an approximation is as good.
 const TABULATED: usize = 256;
 
 /// The largest chi-squared that passes, by degrees of freedom, at one probability.
@@ -26,8 +26,8 @@ impl TrustLimits {
 
     /// Returns the limit for some degrees of freedom.
     ///
-    /// Without any freedom the residuals of a true pose are zero up to points that no pose can
-    /// reach; the limit of one degree of freedom is kept then, so that a fit stuck elsewhere fails.
+    /// With zero degrees of freedom the residuals of the right pose are zero, except for points that no pose can reach.
+    /// The limit for one degree of freedom is used then, so that a fit stuck elsewhere fails.
     pub(crate) fn limit(&self, degrees_of_freedom: usize) -> f64 {
         self.tabulated
             .get(degrees_of_freedom)
@@ -36,7 +36,7 @@ impl TrustLimits {
     }
 }
 
-/// Returns the quantile of chi-squared from that of the normal distribution; to 1e-6 of it from
+/// Returns the quantile of chi-squared from that of the normal distribution, with a relative error of 1e-6 from
 /// [`TABULATED`] degrees of freedom on.
 ///
 /// # Source

@@ -1,9 +1,9 @@
-//! The covariance where the error is not the parabola that its curvature promises.
+//! Covariance where the error is not the parabola that its curvature suggests.
 //!
-//! A flat target seen nearly face on has two minima, mirror images of each other, that run into one
-//! another: between them the image excludes hardly anything, yet at the bottom of each the curvature
-//! promises a sure attitude. Poses on the way to the mirror image show it. Where the image finds one of
-//! them plausible and the covariance does not, the covariance is widened in that direction until it does.
+//! A flat target seen nearly face on has two minima, mirror images of each other, that merge: between them the image
+//! rules out hardly any attitude, yet at each minimum the curvature suggests a precise one. Poses on the way to the
+//! mirror image reveal this. If the image makes one of them plausible and the covariance does not, the covariance is
+//! widened in that direction until it does.
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
 
@@ -13,23 +13,23 @@ use super::problem::Problem;
 use super::refine::Fit;
 use crate::geometry::PoseCovariance;
 
-/// rad², trace of the attitude's covariance; a surer attitude is far from its mirror image.
+/// rad², trace of the attitude's covariance; below it the mirror image is too far away to matter.
 const SURE: f64 = 3.05e-4; // 1°
-/// Rise of chi-squared beyond which a pose is not plausible.
+/// Increase of chi-squared above which a pose is implausible.
 const IMPLAUSIBLE: f64 = 30.0;
-/// Shares of the way to the mirror image.
+/// Fractions of the way to the mirror image.
 const WAY: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
-/// A squared Mahalanobis distance may be this multiple of the rise of chi-squared, plus [`SLACK`].
+/// The squared Mahalanobis distance may be at most this multiple of the increase of chi-squared, plus [`SLACK`].
 const STEEPNESS: f64 = 2.0;
 const SLACK: f64 = 6.0;
 
-/// Returns the covariance of `camera_from_tanker`, wider than the curvature promises where the error is flatter.
+/// Returns the covariance of `camera_from_tanker`, widened where the error is flatter than its curvature suggests.
 ///
 /// # Inputs
 /// * `lever`: from the tanker's origin to the markers' mean, camera axes, m.
 ///
 /// # Errors
-/// [`EstimateError::Degenerate`] when the points do not fix the pose.
+/// [`EstimateError::Degenerate`] if the points do not determine the pose.
 #[inline(always)]
 pub(crate) fn honest_covariance(
     problem: &Problem,
@@ -56,7 +56,7 @@ fn looked_at_closely(
     Ok(PoseCovariance::from_point(&about_mean, lever))
 }
 
-/// Returns a wider covariance, rotation before position of the markers' mean; `None` where the fit's own is honest.
+/// Returns a wider covariance, rotation before position of the markers' mean; `None` if the fit's own is adequate.
 fn flattest(problem: &Problem, fit: &Fit, covariance: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let pose = &fit.pose;
     let information = upper_left(covariance).try_inverse()?;
@@ -77,7 +77,7 @@ fn flattest(problem: &Problem, fit: &Fit, covariance: &Matrix6<f64>) -> Option<M
         }
     }
     let (factor, step) = worst?;
-    // One sigma in the direction of the step, with all that moves with it: C + (k − 1) w wᵀ.
+    // One sigma in the direction of the step, with everything correlated with it: C + (k − 1) w wᵀ.
     let pull = information * step;
     let sigma =
         covariance * Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0) / pull.dot(&step).sqrt();

@@ -13,8 +13,8 @@ use super::rising::solve_rising;
 /// y' = L y + p1 (s + 2 y²) + 2 p2 x y
 /// ```
 ///
-/// Its derivative is symmetric, so it is the gradient of a potential, and one-to-one on any convex
-/// region where the derivative is positive definite. The valid region is the largest such disc.
+/// Its derivative is symmetric, hence the Hessian of a potential, and the mapping is one-to-one on any convex region
+/// where it is positive definite. The valid region is the largest such disc.
 ///
 /// # Source
 /// `OpenCV` `projectPoints`; Brown, *Photogrammetric Engineering* 32(3), 1966.
@@ -124,7 +124,7 @@ impl BrownConrady {
             return limit;
         }
         let at = |step: u32| limit * f64::from(step) / f64::from(STEPS);
-        // The end itself is at the limit of the radial part, where any tangential part is too much.
+        // The end itself is at the limit of the radial part, so any tangential part exceeds it.
         match (1..=STEPS).find(|&step| !self.stretches_all_around(at(step))) {
             Some(step) => polynomial::bisect(at(step - 1), at(step), |radius| {
                 self.stretches_all_around(radius)
@@ -198,10 +198,10 @@ impl BrownConrady {
 
     /// Returns the ideal point within the valid disc; the caller verifies it.
     ///
-    /// The radial part alone gives the start. From there Newton, its steps halved until they stay in
-    /// the disc and lessen the residual, ends when none does: at the solution, if the disc holds it.
+    /// The radial part alone gives the start. Newton's method follows, its steps halved until they stay in the disc and
+    /// reduce the residual. It ends when no step does: at the solution, if the disc contains it.
     pub fn undistort(&self, distorted: Point2<f64>) -> Option<Point2<f64>> {
-        /// Convergence is quadratic: five or so suffice, the rest is for the rim.
+        /// Convergence is quadratic: about five steps suffice, more are needed only near the rim.
         const MAX_STEPS: usize = 60;
         /// A step of this many halvings is below rounding.
         const MAX_HALVINGS: usize = 50;

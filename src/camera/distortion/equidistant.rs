@@ -39,7 +39,7 @@ impl Equidistant {
         }
     }
 
-    /// Returns the lens with its coefficients changed: k1 to k4; further changes mean nothing.
+    /// Returns the lens with k1 to k4 changed; the remaining entries are ignored.
     pub fn with_change(&self, by: [f64; 8]) -> Self {
         Self::new(std::array::from_fn(|index| self.k[index] + by[index]))
     }

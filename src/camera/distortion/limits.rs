@@ -1,16 +1,16 @@
-//! Where lens models stop being valid.
+//! Limits of validity of the lens models.
 
-/// Least stretch at which a lens model still counts as valid, as a part of that in the image centre.
+/// Least stretch of a valid lens model, relative to that in the image centre.
 ///
-/// At the turning point the stretch is 0 and the ray of a pixel undetermined. Here a ray is a thousand
-/// times as uncertain as in the centre and the inverse has lost three of its sixteen digits. The disc
-/// to this limit is about a thousandth smaller than that to the turning point.
+/// At the turning point the stretch is 0 and the ray of a pixel is undetermined. At this limit a ray is a thousand
+/// times as uncertain as in the centre and the inverse has lost three of its sixteen digits. The resulting disc is
+/// about a thousandth smaller than that to the turning point.
 pub(super) const MIN_STRETCH: f64 = 1.0e-3;
 
-/// Largest radial stretch at which a rational lens model still counts as valid, as a part of that in the image centre.
+/// Largest radial stretch of a valid rational lens model, relative to that in the image centre.
 ///
-/// Lenses stay within a factor of three or so. More is the way up to a pole of a rational model, on which all of the
-/// plane beyond the image is squeezed into a thin ring of rays.
+/// Real lenses stay within a factor of about three. A larger stretch means a nearby pole of the rational model, where
+/// the whole plane beyond the image is compressed into a thin ring of rays.
 pub(super) const MAX_STRETCH: f64 = 10.0;
 
 /// Widest angle off the axis, rad: near 90° a ray leaves the plane `z = 1`.

@@ -1,8 +1,8 @@
-//! Lens models: an ideal point on the plane `z = 1` <-> where the lens puts it on that plane.
+//! Lens models: the mapping from ideal to distorted points on the plane `z = 1`, and its inverse.
 //!
-//! Every model comes with its valid region, a disc of ideal points found once at construction, on
-//! which it is one-to-one: both directions refuse what lies outside. A calibrated polynomial means
-//! nothing beyond its turning point, where a second ray falls on the same pixel.
+//! Every model has a valid region, a disc of ideal points that is determined once at construction and on which the
+//! mapping is one-to-one. Both directions refuse points outside. A calibrated polynomial is meaningless beyond its
+//! turning point, where a second ray falls on the same pixel.
 //!
 //! The formulas are those of `OpenCV` (`projectPoints`, `fisheye::projectPoints`), which ROS's
 //! `distortion_model` names refer to.
@@ -18,15 +18,15 @@ use nalgebra::{Matrix2, Point2};
 pub(super) use brown_conrady::BrownConrady;
 pub(super) use equidistant::Equidistant;
 
-/// Largest residual of an accepted inverse, on the plane `z = 1`, relative beyond radius 1.
+/// Largest residual of an accepted inverse on the plane `z = 1`; relative for radii above 1.
 const MAX_RESIDUAL: f64 = 1.0e-12;
 
-/// A pair of radii that tells why a distorted point has no ideal one.
+/// Two radii that explain why a distorted point has no ideal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outside {
     /// Radius of the distorted point.
     pub radius: f64,
-    /// Radius of the image of the valid disc's rim in the same direction.
+    /// Radius of the valid disc's rim in the same direction, distorted.
     pub max_radius: f64,
 }
 
@@ -58,7 +58,7 @@ impl Lens {
             Self::Equidistant(lens) => (lens.undistort(distorted), lens.rim_radius()),
         };
         let radius = distorted.coords.norm();
-        // Verified whatever the solver did: inside the disc, and distorted back to where it came from.
+        // Verified independently of the solver: inside the disc, and distorted back to the input.
         found
             .filter(|&ideal| {
                 self.distort(ideal).is_some_and(|(back, _)| {

@@ -1,4 +1,4 @@
-//! Smallest roots, so that a lens model's valid region is found rather than guessed.
+//! Smallest roots of polynomials, which determine a lens model's valid region.
 
 /// Returns the value of a polynomial, `coefficients` from the constant term up.
 pub(super) fn evaluate(coefficients: &[f64], x: f64) -> f64 {
@@ -29,16 +29,16 @@ pub(super) fn derivative(coefficients: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the smallest place in `(0, upper)` where the polynomial changes sign, if it does.
+/// Returns the smallest `x` in `(0, upper)` where the polynomial changes sign, if any.
 pub(super) fn first_sign_change(coefficients: &[f64], upper: f64) -> Option<f64> {
     sign_changes(coefficients, upper).first().copied()
 }
 
-/// Returns all places in `(0, upper)` where the polynomial changes sign, ascending.
+/// Returns all `x` in `(0, upper)` where the polynomial changes sign, ascending.
 ///
-/// Between neighbouring sign changes of its derivative a polynomial is monotone, so each such stretch
-/// holds at most one and bisection finds it: no start value, nothing missed. (A derivative that only
-/// touches zero does not end a monotone stretch.)
+/// Between neighbouring sign changes of its derivative a polynomial is monotone, so each such interval contains at most
+/// one, which bisection finds without a start value. (A derivative that only touches zero does not end a monotone
+/// interval.)
 fn sign_changes(coefficients: &[f64], upper: f64) -> Vec<f64> {
     if coefficients.len() < 2 {
         return Vec::new();
@@ -59,7 +59,7 @@ fn sign_changes(coefficients: &[f64], upper: f64) -> Vec<f64> {
     found
 }
 
-/// Returns the last place from which `still` holds, to rounding, given that it holds at `start` and not at `end`.
+/// Returns the last `x` at which `still` holds, to rounding, given that it holds at `start` and not at `end`.
 pub(super) fn bisect(mut start: f64, mut end: f64, still: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = f64::midpoint(start, end);

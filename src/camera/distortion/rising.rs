@@ -1,9 +1,9 @@
-//! Inverse of a rising function.
+//! Inverse of an increasing function.
 
-/// Returns the `x` in `[0, upper]` where a rising function meets a target, by Newton kept in a bracket.
+/// Returns the `x` in `[0, upper]` where an increasing function reaches a target, by Newton's method within a bracket.
 ///
-/// `function` gives value and slope, with value 0 at 0; a target beyond the value at `upper` gives
-/// `upper`. Ends after a bounded number of steps whatever the function does.
+/// `function` returns value and slope, with value 0 at 0; a target above the value at `upper` gives `upper`. The number
+/// of steps is bounded for every function.
 pub(super) fn solve_rising(target: f64, upper: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
     /// Bisection alone needs about 60 from any bracket.
     const MAX_STEPS: usize = 120;

@@ -188,7 +188,7 @@ fn calibration_of_another_resolution_is_refused() {
     assert_eq!(of_both, 20);
     assert_eq!(
         raw(|info| *info = scaled(2.0, 508, 412)),
-        "the principal point (508, 412) of k is the centre of an image of 1016x824, but width and height say 508x412: \
+        "the principal point (508, 412) of k is the centre of an image of 1016x824, but width and height are 508x412: \
          calibrate at the resolution that is used, or scale k to it; if the image is a part of a larger one, set roi, \
          and width and height of the full image"
     );
@@ -291,7 +291,7 @@ fn the_projection_of_a_stereo_pair_is_refused() {
 fn an_unknown_lens_is_refused_by_name() {
     assert_eq!(
         raw(|info| info.distortion_model = "division".to_owned()),
-        "distortion model `division` with d = [-0.2, 0.05, 0.0, 0.0, 0.0] is not known; known are plumb_bob, \
+        "distortion model `division` with d = [-0.2, 0.05, 0.0, 0.0, 0.0] is unknown; known models are plumb_bob, \
          rational_polynomial, equidistant"
     );
     assert!(

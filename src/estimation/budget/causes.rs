@@ -1,4 +1,4 @@
-//! What the causes of a budget did in one frame: their estimated amplitudes, and their shares of the covariance.
+//! The effect of each cause of the budget in one frame: estimated amplitude, and share of the covariance.
 
 use nalgebra::{
     DMatrix, DVector, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Matrix6, Vector2, Vector6,
@@ -9,26 +9,26 @@ use crate::camera::{CALIBRATION_SIZE, Camera, Ray};
 use crate::estimation::{Observation, Solution};
 use crate::geometry::{PoseCovariance, skew};
 
-/// What kind of cause it is; by this a track knows how long it lasts.
+/// The kind of cause; it determines for how long a track takes it as constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CauseKind {
     /// Noise of single detections.
     Noise,
-    /// The part of it that lasts from frame to frame.
+    /// The part of it that is correlated from frame to frame.
     CorrelatedNoise {
-        /// How long, s.
+        /// Its time constant, s.
         time_constant_s: f64,
     },
-    /// The place of markers on the tanker: constant.
+    /// The surveyed positions of markers on the tanker: constant.
     Survey,
-    /// A way in which the airframe bends.
+    /// A mode in which the airframe bends.
     Flex {
-        /// How long an amplitude lasts, s; `None`: for the whole flight.
+        /// Time constant of its amplitude, s; `None`: constant for the whole flight.
         time_constant_s: Option<f64>,
     },
     /// The calibration: constant.
     Calibration,
-    /// A shift of the whole image, another one in each frame.
+    /// A shift of the whole image, independent in each frame.
     Jitter,
     /// The prior of the attitude.
     Attitude,
@@ -41,26 +41,27 @@ pub struct Cause {
     pub name: String,
     /// What kind of cause it is.
     pub kind: CauseKind,
-    /// Its estimated amplitude in its sigmas; `None` for causes that are not one number.
+    /// Its estimated amplitude in its sigmas; `None` for causes that are not a single number.
     pub amplitude_sigmas: Option<f64>,
-    /// Error of the pose that one sigma of it makes, in the order of [`PoseCovariance`]; `None` as above.
+    /// Error of the pose that one sigma of it causes, in the order of [`PoseCovariance`]; `None` as above.
     pub shift: Option<Vector6<f64>>,
-    /// Its share of the covariance: the shares add up to the whole.
+    /// Its share of the covariance; the shares add up to the whole.
     pub covariance: PoseCovariance,
 }
 
 /// All causes in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameCauses {
-    /// Noise first, then what lasts of it, survey, flex, calibration, jitter, attitude, as far as the budget has them.
+    /// Noise first, then its correlated part, survey, flex, calibration, jitter, attitude, as far as the budget has
+    /// them.
     pub causes: Vec<Cause>,
-    /// For each used marker with a survey error: its id and the error of the pose that one sigma of it makes along
+    /// For each used marker with a survey error: its id and the error of the pose that one sigma of it causes along
     /// each of the tanker's axes.
     pub survey_shifts: Vec<(u32, [Vector6<f64>; 3])>,
-    /// With noise that lasts: for each used marker its id and the error of the pose that one sigma of it makes in u and
-    /// in v.
+    /// With correlated noise: for each used marker its id and the error of the pose that one sigma of it causes in u
+    /// and in v.
     pub noise_shifts: Vec<(u32, [Vector6<f64>; 2])>,
-    /// With a prior of the attitude: the error of the pose that one sigma of it makes about each of the camera's axes.
+    /// With a prior of the attitude: the error of the pose that one sigma of it causes about each of the camera's axes.
     pub attitude_shifts: Option<[Vector6<f64>; 3]>,
 }
 
@@ -75,11 +76,11 @@ impl FrameCauses {
     }
 }
 
-/// A used point: derivative by the pose, covariance of its own, and its residual.
+/// A used point: derivative by the pose, its own covariance, and its residual.
 struct Row {
     id: u32,
     by_pose: Matrix2x6<f64>,
-    /// By its place on the tanker, px/m.
+    /// Derivative by the marker's position on the tanker, px/m.
     by_marker: Matrix2x3<f64>,
     weight: Matrix2<f64>,
     noise_px: f64,
@@ -88,10 +89,10 @@ struct Row {
     by_calibration: nalgebra::SMatrix<f64, 2, CALIBRATION_SIZE>,
 }
 
-/// Returns what the causes did; `None` where a point has no pixel at the pose or the pose is not fixed.
+/// Returns the effects of all causes; `None` if a point has no pixel at the pose or the pose is not determined.
 ///
 /// # Inputs
-/// * `attitude_information`: of the prior about each axis, 1/rad²; 0 without one.
+/// * `attitude_information`: of the prior about each axis, 1/rad²; 0 without a prior.
 pub(in crate::estimation) fn frame_causes(
     budget: Option<&ErrorBudget>,
     attitude_information: f64,
@@ -189,7 +190,7 @@ pub(in crate::estimation) fn frame_causes(
     })
 }
 
-/// What the errors of single points do to the pose.
+/// The effect of the errors of single points on the pose.
 struct Own {
     noise: Matrix6<f64>,
     noise_shifts: Vec<(u32, [Vector6<f64>; 2])>,
@@ -202,7 +203,7 @@ struct Own {
 /// # Inputs
 /// * `through`: information that pose and modes share, times the covariance of the modes given the pose.
 /// * `covariance`: of the pose.
-/// * `lasting_share`: what part of the noise lasts.
+/// * `lasting_share`: the share of the noise's variance that is correlated in time.
 fn own_errors(
     rows: &[Row],
     modes: &[Mode],

@@ -1,6 +1,6 @@
-//! Noise of single detections that lasts from frame to frame.
+//! Noise of single detections that is correlated from frame to frame.
 
-/// Numbers that are no correlated noise.
+/// Invalid parameters of correlated noise.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "expected a share of noise from 0 to 1 and a finite time constant above 0 s, got {share} and {time_constant_s} s"
@@ -12,8 +12,8 @@ pub struct CorrelatedNoiseError {
     pub time_constant_s: f64,
 }
 
-/// The part of the noise of single detections that lasts from frame to frame, as a Gauss–Markov process of first order
-/// in u and in v of each marker: a detector that filters over time, a beacon whose glare wanders.
+/// The part of the noise of single detections that is correlated from frame to frame, as a first-order Gauss–Markov
+/// process in u and in v of each marker. Examples: a detector that filters over time, a beacon whose glare wanders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrelatedNoise {
     share: f64,
@@ -21,11 +21,11 @@ pub struct CorrelatedNoise {
 }
 
 impl CorrelatedNoise {
-    /// Returns the checked numbers.
+    /// Returns the checked parameters.
     ///
     /// # Inputs
-    /// * `share`: what part of a detection's variance lasts, 0 to 1.
-    /// * `time_constant_s`: how long.
+    /// * `share`: correlated share of a detection's variance, 0 to 1.
+    /// * `time_constant_s`: its time constant.
     ///
     /// # Errors
     /// [`CorrelatedNoiseError`]: out of range.
@@ -43,13 +43,13 @@ impl CorrelatedNoise {
             })
     }
 
-    /// Returns what part of a detection's variance lasts.
+    /// Returns the correlated share of a detection's variance.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.share
     }
 
-    /// Returns how long it lasts, s.
+    /// Returns the time constant, s.
     #[must_use]
     pub fn time_constant_s(&self) -> f64 {
         self.time_constant_s

@@ -1,4 +1,4 @@
-//! The budget of one frame: what each point of it may have wrong, in blocks of four beside those of the points.
+//! The budget of one frame: the errors of each point, in blocks of four that correspond to those of the points.
 
 use nalgebra::{Rotation3, Vector2, Vector3};
 use smallvec::SmallVec;
@@ -10,10 +10,10 @@ use crate::estimation::lanes::four::{Arithmetic, Four, Kernel, LANES, Lane, Numb
 use crate::estimation::lanes::points::{Block, Points};
 use crate::target::MAX_FLEX_MODES;
 
-/// Lanes kept without the heap: 64 points with one flex mode and six modes of the image, or fewer with more.
+/// Lanes kept on the stack: 64 points with one flex mode and six modes of the image, or fewer points with more modes.
 const INLINE_LANES: usize = 512;
 
-/// Lanes of a block: noise, weight, survey; then three for each flex mode and two for each mode of the image.
+/// Lanes of a block: noise, weight, survey, then three for each flex mode and two for each mode of the image.
 pub(super) const NOISE: usize = 0;
 pub(super) const WEIGHT: usize = 1;
 pub(super) const SURVEY: usize = 2;
@@ -27,7 +27,7 @@ pub(crate) struct AttitudePrior {
     pub(crate) information: f64,
 }
 
-/// What each point of a frame may have wrong.
+/// The error budget of each point of a frame.
 #[derive(Debug)]
 pub(crate) struct FrameBudget {
     lanes: SmallVec<[Lane; INLINE_LANES]>,
@@ -36,9 +36,9 @@ pub(crate) struct FrameBudget {
     pub(super) attitude: Option<AttitudePrior>,
 }
 
-/// What one point may have wrong.
+/// The error budget of one point.
 pub(crate) struct PointBudget {
-    /// Of each coordinate, m².
+    /// Variance of each coordinate, m².
     pub(crate) survey_variance_m2: f64,
     /// Its displacement by each flex mode at one sigma, tanker frame, m.
     pub(crate) flex: SmallVec<[Vector3<f64>; MAX_FLEX_MODES]>,
@@ -47,7 +47,7 @@ pub(crate) struct PointBudget {
 }
 
 impl FrameBudget {
-    /// Returns room for a frame.
+    /// Returns empty storage for a frame.
     #[inline(always)]
     pub(crate) fn new(attitude: Option<AttitudePrior>) -> Self {
         Self {
@@ -58,13 +58,13 @@ impl FrameBudget {
         }
     }
 
-    /// Returns how many degrees of freedom the prior adds to the test of the residuals.
+    /// Returns the degrees of freedom that the prior adds to the test of the residuals.
     pub(crate) fn degrees_of_freedom(&self) -> usize {
         if self.attitude.is_some() { 3 } else { 0 }
     }
 
-    /// Takes the parts of these points from a budget. Modes of the image are taken where the points were seen: a
-    /// pixel or two off changes them by a share of a percent.
+    /// Fills in the budget of these points. Modes of the image are evaluated at the detected pixels: an offset of a
+    /// pixel or two changes them by a fraction of a percent.
     pub(crate) fn fill(
         &mut self,
         budget: Option<&ErrorBudget>,
@@ -119,7 +119,7 @@ impl FrameBudget {
                         .ray_from_pixel(seen.pixel)
                         .ok()
                         .and_then(|ray| camera.pixel_by_calibration(ray));
-                    // The points have been measured: each has a ray.
+                    // The points have been prepared, so each has a ray.
                     let Some(by) = by else { continue };
                     let shifts = lanes[first..].as_chunks_mut::<2>().0;
                     for (shift, mode) in shifts.iter_mut().zip(&budget.image) {
@@ -133,13 +133,13 @@ impl FrameBudget {
         }
     }
 
-    /// Returns the parts of each block of four.
+    /// Returns the lanes of each block of four points.
     #[inline(always)]
     pub(super) fn blocks(&self) -> std::slice::ChunksExact<'_, Lane> {
         self.lanes.chunks_exact(self.stride())
     }
 
-    /// Returns what one point may have wrong.
+    /// Returns the budget of one point.
     pub(crate) fn point(&self, index: usize) -> PointBudget {
         let (block, lane) = (index / LANES, index % LANES);
         let lanes = &self.lanes[block * self.stride()..][..self.stride()];
@@ -153,7 +153,7 @@ impl FrameBudget {
         }
     }
 
-    /// Returns how many modes there are.
+    /// Returns the number of modes.
     #[inline(always)]
     pub(super) fn modes(&self) -> usize {
         self.flex_modes + self.image_modes
@@ -197,7 +197,7 @@ impl Kernel for PinholeModes<'_> {
     }
 }
 
-/// What the columns of `Camera::pixel_by_calibration` are made of, for a camera without distortion.
+/// Terms of the columns of `Camera::pixel_by_calibration` for a camera without distortion.
 struct PinholeColumns<A: Arithmetic> {
     zero: Four<A>,
     one: Four<A>,

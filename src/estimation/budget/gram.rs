@@ -1,8 +1,8 @@
-//! Sums over points that tie modes to the pose and to each other, and the elimination of the modes.
+//! Sums over points that couple modes to the pose and to each other, and the elimination of the modes.
 //!
-//! With `W` the inverse covariance of the noise of single points, `H` the modes and `J` the derivative by the pose,
-//! the amplitudes have the normal equations `A = 1 + HᵀWH`, tied to the pose by `C = JᵀWH`. Then
-//! `JᵀΣ⁻¹J = JᵀWJ − C A⁻¹ Cᵀ`, and so for gradient and chi-squared: Woodbury's identity.
+//! With `W` the inverse covariance of the noise of single points, `H` the modes and `J` the derivative by the pose, the
+//! amplitudes have the normal equations `A = 1 + HᵀWH`, with the coupling `C = JᵀWH` to the pose. Then `JᵀΣ⁻¹J = JᵀWJ −
+//! C A⁻¹ Cᵀ`, and likewise for gradient and chi-squared (Woodbury's identity).
 
 use crate::estimation::lanes::four::{Arithmetic, Four, Number, totals};
 use crate::estimation::lanes::information::{Information, Vector};
@@ -11,7 +11,7 @@ use crate::estimation::residuals::Slope;
 /// Sums for at most `K` modes.
 #[derive(Clone, Copy)]
 pub(super) struct Gram<N, const K: usize> {
-    /// `JᵀWH`, a row for each mode: turn before position.
+    /// `JᵀWH`, a row for each mode: rotation before position.
     cross: [[N; 6]; K],
     /// `HᵀWH`, the lower triangle.
     modes: [[N; K]; K],
@@ -29,7 +29,7 @@ impl<N: Number, const K: usize> Gram<N, K> {
         }
     }
 
-    /// Adds a mode's pull on the pose: `a` the arm, `s = Dᵀ W h`.
+    /// Adds the coupling of a mode with the pose: `a` the arm, `s = Dᵀ W h`.
     #[inline(always)]
     pub(super) fn add_cross(&mut self, mode: usize, [a1, a2, a3]: [N; 3], s: [N; 3]) {
         let row = &mut self.cross[mode];
@@ -41,7 +41,7 @@ impl<N: Number, const K: usize> Gram<N, K> {
         }
     }
 
-    /// Adds the product of two modes, the second one not after the first.
+    /// Adds the product of two modes; the second index is not greater than the first.
     #[inline(always)]
     pub(super) fn add_pair(&mut self, mode: usize, other: usize, q: [N; 2], h: [N; 2]) {
         let sum = &mut self.modes[mode][other];
@@ -63,7 +63,7 @@ impl<A: Arithmetic, const K: usize> Gram<Four<A>, K> {
     }
 }
 
-/// `A = L Lᵀ` and `Y = L⁻¹ Cᵀ`: what eliminates the modes from a gradient.
+/// `A = L Lᵀ` and `Y = L⁻¹ Cᵀ`, with which the modes are eliminated.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Elimination<const K: usize> {
     modes: usize,
@@ -73,7 +73,7 @@ pub(crate) struct Elimination<const K: usize> {
 }
 
 impl<const K: usize> Elimination<K> {
-    /// Returns the elimination; `None` where the sums are not finite.
+    /// Returns the elimination; `None` if the sums are not finite.
     #[inline(always)]
     pub(super) fn new(gram: &Gram<f64, K>, modes: usize) -> Option<Self> {
         let mut lower = [[0.0; K]; K];
@@ -108,7 +108,7 @@ impl<const K: usize> Elimination<K> {
         })
     }
 
-    /// Takes from the information what the modes explain as well.
+    /// Subtracts from the information what the modes explain.
     #[inline(always)]
     pub(super) fn reduce(&self, information: &mut Information) {
         for [a, b, c, d, e, f] in &self.cross[..self.modes] {
@@ -126,7 +126,7 @@ impl<const K: usize> Elimination<K> {
         }
     }
 
-    /// Takes from gradient and chi-squared what the modes explain as well; `residual` is `HᵀWr`.
+    /// Subtracts from gradient and chi-squared what the modes explain; `residual` is `HᵀWr`.
     #[inline(always)]
     pub(super) fn reduce_slope(&self, residual: &[f64; K], slope: &mut Slope) {
         let whitened = self.forward(residual);

@@ -1,4 +1,4 @@
-//! A frame's points with their budget: fits, and what a fit would reach.
+//! A frame's points with their error budget: fits, and predictions of a fit from one step.
 
 use super::frame::FrameBudget;
 use super::residuals::{LensBudget, PinholeBudget};
@@ -11,7 +11,7 @@ use crate::estimation::lanes::symmetric3::{positive_inverse, times};
 use crate::estimation::refine::{self, Fit, FitFailure};
 use crate::estimation::residuals::Residuals;
 
-/// A frame's points with their budget.
+/// A frame's points with their error budget.
 pub(crate) struct InDoubt<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) observations: &'a [Observation],
@@ -30,17 +30,17 @@ impl InDoubt<'_> {
         self.run(At { pose })
     }
 
-    /// Returns chi-squared as one step from a pose promises it.
+    /// Returns chi-squared as predicted after one step from a pose.
     pub(crate) fn promised(&self, pose: CentredPose) -> Option<f64> {
         self.run(Promised { pose })
     }
 
-    /// Returns chi-squared with this attitude, at the position that one step promises.
+    /// Returns chi-squared with this attitude, at the position predicted by one step.
     pub(crate) fn with_attitude(&self, pose: CentredPose) -> Option<f64> {
         self.run(WithAttitude { pose })
     }
 
-    /// Runs a task with room for as many modes as there are: less room is less to clear.
+    /// Runs a task with storage for the number of modes: less storage takes less time to clear.
     fn run<T: Task>(&self, task: T) -> T::Output {
         match self.budget.modes() {
             0..=3 => self.run_with::<T, 3>(task),
@@ -67,7 +67,7 @@ impl InDoubt<'_> {
     }
 }
 
-/// Something to be done with residuals of any kind.
+/// An operation on residuals of any kind.
 trait Task {
     type Output;
     fn run(self, residuals: &impl Residuals) -> Self::Output;

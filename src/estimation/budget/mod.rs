@@ -1,16 +1,16 @@
-//! The error budget: what else than the noise of single detections makes pixels differ from their prediction.
+//! The error budget: causes other than the noise of single detections that make pixels differ from their prediction.
 //!
-//! Every cause has a standard deviation, stated by the user. Causes that many points share (a bent wing, a wrong
-//! focal length, an image that shakes) are *modes*: each is a vector of pixel shifts at one sigma. Survey errors
-//! belong to one marker each. The covariance of all pixels of a frame is then
+//! The user states a standard deviation for every cause. Causes that affect many points together (a bent wing, a wrong
+//! focal length, a shaking image) are *modes*: each is a vector of pixel shifts at one sigma. Survey errors are
+//! independent for each marker. The covariance of all pixels of a frame is then
 //!
 //! ```text
 //! Σ = diag(σᵢ²) + blockdiag(Dᵢ Sᵢ Dᵢᵀ) + Σₘ hₘ hₘᵀ,   Dᵢ = ∂pixel/∂point in the camera frame
 //! ```
 //!
 //! with `Sᵢ = sᵢ² 1` the survey covariance of marker `i`. Weights, covariance and chi-squared are those of the whole
-//! `Σ`. It is never formed: estimating the amplitude of every mode, with a prior of one sigma, and eliminating it
-//! gives the same, at a cost linear in the number of points.
+//! `Σ`, which is never formed: the amplitude of every mode is estimated with a prior of one sigma and eliminated, which
+//! gives the same result at a cost linear in the number of points.
 
 mod causes;
 mod correlated_noise;
@@ -32,32 +32,33 @@ pub use correlated_noise::{CorrelatedNoise, CorrelatedNoiseError};
 pub(super) use frame::{AttitudePrior, FrameBudget};
 pub(super) use in_doubt::InDoubt;
 
-/// Most modes of calibration and jitter together: all numbers of a calibration, and a shake in u and in v.
+/// Largest number of modes of calibration and jitter together: all parameters of a calibration, and jitter in u and in
+/// v.
 const MAX_IMAGE_MODES: usize = CALIBRATION_SIZE + 2;
-/// Most modes of all kinds.
+/// Largest number of modes of all kinds.
 const MAX_MODES: usize = MAX_FLEX_MODES + MAX_IMAGE_MODES;
 
-/// A way in which the airframe bends: where each marker goes at one sigma.
+/// A mode in which the airframe bends: the displacement of each marker at one sigma.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexMode {
-    /// Its name, for reports.
+    /// Its name for reports.
     pub name: String,
-    /// How long an amplitude lasts, s; `None`: for the whole flight.
+    /// Time constant of its amplitude, s; `None`: constant for the whole flight.
     pub time_constant_s: Option<f64>,
-    /// Marker id and displacement at one sigma, tanker frame, m. Markers that are not listed stay where they are.
+    /// Marker id and displacement at one sigma, tanker frame, m. Markers that are not listed do not move.
     pub shape: Vec<(u32, Vector3<f64>)>,
 }
 
-/// A direction in which the calibration may be wrong: its change at one sigma.
+/// A possible error of the calibration: its change at one sigma.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationMode {
-    /// Its name, for reports.
+    /// Its name for reports.
     pub name: String,
     /// The change of the calibration at one sigma.
     pub change: CalibrationChange,
 }
 
-/// Standard deviations of all that a map, a calibration and a mount may have wrong, checked.
+/// Checked standard deviations of the errors of a map, a calibration and a mount.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBudget {
     flex: Vec<FlexMode>,
@@ -69,7 +70,7 @@ pub struct ErrorBudget {
     image: Vec<ImageMode>,
 }
 
-/// What may be wrong with the place of one marker.
+/// Errors of the position of one marker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MarkerBudget {
     id: u32,
@@ -85,26 +86,26 @@ struct ImageMode {
     terms: Vec<(usize, f64)>,
 }
 
-/// Why standard deviations are no budget.
+/// Why standard deviations are not a valid budget.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BudgetError {
-    /// A number that is no standard deviation.
+    /// Not a standard deviation.
     #[error("expected a finite number of 0 or more for {of}, got {value}")]
     Sigma {
-        /// What it is the sigma of.
+        /// The quantity with this sigma.
         of: String,
-        /// What came.
+        /// The value.
         value: f64,
     },
-    /// More modes than there is room for.
+    /// Too many modes.
     #[error("expected at most {most} modes of {kind}, got {got}")]
     TooManyModes {
-        /// Which kind of mode.
+        /// The kind of mode.
         kind: &'static str,
-        /// How many there may be.
+        /// The limit.
         most: usize,
-        /// How many came.
+        /// The number of modes.
         got: usize,
     },
 }
@@ -113,11 +114,11 @@ pub enum BudgetError {
 const PRINCIPAL_POINT: usize = 2;
 
 impl ErrorBudget {
-    /// Returns the checked budget; all of it may be zero.
+    /// Returns the checked budget; all values may be zero.
     ///
     /// # Inputs
     /// * `survey`: marker id and standard deviation of each of its coordinates, m.
-    /// * `jitter_px`: standard deviation of a shift of the whole image, each frame another one, px.
+    /// * `jitter_px`: standard deviation of a shift of the whole image, independent in each frame, px.
     ///
     /// # Errors
     /// [`BudgetError`]: a value that is negative or not finite, too many modes.
@@ -144,7 +145,7 @@ impl ErrorBudget {
         Ok(budget)
     }
 
-    /// Returns the budget of numbers that have been checked one by one: a map's, and parameters'.
+    /// Returns the budget from values that have already been checked: a map's, and parameters'.
     pub(crate) fn of_checked(
         survey: &[(u32, f64)],
         flex: Vec<FlexMode>,
@@ -163,8 +164,8 @@ impl ErrorBudget {
         }
     }
 
-    /// Returns the budget with a part of the detections' noise that lasts. Single frames are estimated as without it;
-    /// the track takes less of them as new.
+    /// Returns the budget with correlated noise. Single frames are estimated as without it; the track counts less of
+    /// their information as new.
     #[must_use]
     pub fn with_correlated_noise(self, correlated_noise: Option<CorrelatedNoise>) -> Self {
         Self {
@@ -173,13 +174,13 @@ impl ErrorBudget {
         }
     }
 
-    /// Returns the part of the detections' noise that lasts, if any does.
+    /// Returns the correlated noise, if any.
     #[must_use]
     pub fn correlated_noise(&self) -> Option<CorrelatedNoise> {
         self.correlated_noise
     }
 
-    /// Returns whether nothing is in doubt: then the estimate is that without a budget.
+    /// Returns whether the budget is empty; the estimate is then that without a budget.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let is_exact = |marker: &MarkerBudget| {
@@ -214,7 +215,8 @@ impl ErrorBudget {
             .map_or(0.0, |marker| marker.survey_sigma_m)
     }
 
-    /// Returns a marker's part. Markers mostly come in the map's order: `place` remembers where to look first.
+    /// Returns a marker's part. Markers usually come in the map's order: `place` is the index at which the search
+    /// begins.
     #[inline(always)]
     fn marker(&self, id: u32, place: &mut usize) -> Option<&MarkerBudget> {
         if self
@@ -293,8 +295,8 @@ fn entry(markers: &mut BTreeMap<u32, MarkerBudget>, id: u32) -> &mut MarkerBudge
     })
 }
 
-/// Returns the modes of the image. A shaking image and a wrong principal point look the same in one frame: where the
-/// principal point has modes of its own, the jitter joins them.
+/// Returns the modes of the image. Jitter and a wrong principal point are indistinguishable in one frame, so the jitter
+/// is added to the modes of the principal point if there are any.
 fn image_modes(calibration: &[CalibrationMode], jitter_px: f64) -> Vec<ImageMode> {
     let mut jitter = [jitter_px; 2];
     let mut modes = Vec::new();

@@ -1,4 +1,4 @@
-//! Residuals weighted by the whole budget: one point at a time through a lens, four at a time through a pinhole.
+//! Residuals weighted by the whole budget: one point at a time for a lens, four at a time for a pinhole.
 
 use std::ops::Div;
 
@@ -15,11 +15,11 @@ use crate::estimation::lanes::four::{
 use crate::estimation::lanes::points::{Block, Points};
 use crate::estimation::residuals::{Linearised, Residuals, Slope, SlopeSums, Sums, Weight};
 
-/// Share by which chi-squared may rise in a step that is taken: the weights move with the pose, and with them what
-/// chi-squared means. A step that leads astray raises it more.
+/// Share by which chi-squared may rise in an accepted step: the weights depend on the pose, and chi-squared changes
+/// with them. A diverging step raises it more.
 const REWEIGHTED: f64 = 0.2;
 
-/// Points seen by a camera without distortion.
+/// Points of a camera without distortion.
 pub(crate) struct PinholeBudget<'a, A, const K: usize> {
     pub(crate) arithmetic: A,
     pub(crate) points: &'a Points<'a>,
@@ -27,7 +27,7 @@ pub(crate) struct PinholeBudget<'a, A, const K: usize> {
     pub(crate) budget: &'a FrameBudget,
 }
 
-/// Points seen through any lens.
+/// Points of a camera with any lens.
 pub(crate) struct LensBudget<'a, const K: usize> {
     pub(crate) camera: &'a Camera,
     pub(crate) observations: &'a [Observation],
@@ -35,18 +35,18 @@ pub(crate) struct LensBudget<'a, const K: usize> {
     pub(crate) budget: &'a FrameBudget,
 }
 
-/// A point as it is seen from a pose, px and m.
+/// A point as seen from a pose, px and m.
 #[derive(Clone, Copy)]
 struct Sight<N> {
     /// From the markers' mean, camera axes, m.
     arm: [N; 3],
     /// `D`, px/m.
     by_point: [[N; 3]; 2],
-    /// Predicted minus seen, px.
+    /// Predicted minus detected, px.
     residual: [N; 2],
 }
 
-/// A point with its two residuals made independent: the second one minus its part in the first.
+/// A point with decorrelated residuals: the correlated part of the first is subtracted from the second.
 #[derive(Clone, Copy)]
 struct Independent<N> {
     arm: [N; 3],
@@ -54,12 +54,12 @@ struct Independent<N> {
     residual: [N; 2],
     /// Inverse variances.
     weight: [N; 2],
-    /// What of the first residual was taken from the second.
+    /// The factor of the first residual that was subtracted from the second.
     part: N,
 }
 
 impl<N: Number + Div<Output = N>> Sight<N> {
-    /// Weighs the residuals by noise and survey error: `σ² 1 + s² D Dᵀ`.
+    /// Weights the residuals by noise and survey error: `σ² 1 + s² D Dᵀ`.
     #[inline(always)]
     fn weighed(&self, noise: N, there: N, survey: N) -> Independent<N> {
         let [d1, d2] = &self.by_point;
@@ -126,7 +126,7 @@ impl<N: Number> Independent<N> {
         }
     }
 
-    /// Returns the shift of this point by a mode, its residuals made independent.
+    /// Returns the shift of this point by a mode, decorrelated as the residuals are.
     #[inline(always)]
     fn mode(
         &self,
@@ -195,7 +195,7 @@ impl<N: Number, const K: usize> Everything<N, K> {
     }
 }
 
-/// The sums of one look at the slope.
+/// The sums for a slope.
 struct SlopeOnly<N, const K: usize> {
     points: SlopeSums<N>,
     residual: [N; K],
@@ -258,7 +258,7 @@ impl FrameBudget {
     ) -> Slope {
         kept.reduce_slope(residual, &mut slope);
         if let Some(prior) = &self.attitude {
-            // The vector of a turn is its own image under the derivative of the logarithm.
+            // The rotation vector is invariant under the derivative of the logarithm.
             let turn = (pose.rotation * prior.camera_from_tanker.inverse()).scaled_axis();
             for axis in 0..3 {
                 slope.gradient[axis] += prior.information * turn[axis];
@@ -270,7 +270,7 @@ impl FrameBudget {
 }
 
 impl<A: Arithmetic, const K: usize> PinholeBudget<'_, A, K> {
-    /// Gives each block to `add`; returns whether all points were in front of the camera.
+    /// Passes each block to `add`; returns whether all points were in front of the camera.
     #[inline(always)]
     fn visit(
         &self,
@@ -301,7 +301,7 @@ impl<A: Arithmetic, const K: usize> PinholeBudget<'_, A, K> {
             let seen = sight.weighed(load(NOISE), load(WEIGHT), load(SURVEY));
             add(&seen, &rotation, lanes, &sight);
         }
-        // A depth that is not a number makes the squared residuals so too.
+        // If a depth is NaN, so are the squared residuals.
         nearest.iter().all(|depth| *depth > 0.0)
     }
 
@@ -413,7 +413,7 @@ fn add_squares<N: Number>(slope: &mut SlopeSums<N>, sight: &Sight<N>, there: N) 
 }
 
 impl<const K: usize> LensBudget<'_, K> {
-    /// Gives each point to `add`; `None` where one has no pixel.
+    /// Passes each point to `add`; `None` if one has no pixel.
     fn visit(
         &self,
         pose: &CentredPose,
@@ -437,7 +437,7 @@ impl<const K: usize> LensBudget<'_, K> {
     }
 }
 
-/// Returns how a point is seen from a pose; `None` where it has no pixel.
+/// Returns a point as seen from a pose; `None` if it has no pixel.
 fn sight_through(
     camera: &Camera,
     seen: &Observation,

@@ -1,4 +1,4 @@
-//! The quadratic form, its derivatives, and the position that belongs to a rotation.
+//! The quadratic form, its derivatives, and the optimal position for a rotation.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -19,14 +19,14 @@ pub(crate) struct CollinearityCost {
 }
 
 impl CollinearityCost {
-    /// A place for a cost.
+    /// An empty cost, to be filled in place.
     pub(crate) const EMPTY: Self = Self {
         omega: [[[0.0; LANES]; 3]; 9],
         centre_from_rotation: [[0.0; LANES]; 9],
     };
 
-    /// Makes this the cost of some points; `None` when their rays do not fix a position (all of them one
-    /// and the same).
+    /// Sets this to the cost of some points; `None` if their rays do not determine a position (because they all
+    /// coincide).
     #[inline(always)]
     pub(crate) fn fill<A: Arithmetic>(
         &mut self,
@@ -77,7 +77,7 @@ impl CollinearityCost {
     ) -> Columns<A> {
         let mut y = [Four::splat(arithmetic, 0.0); 3];
         for a in 0..3 {
-            // Three sums side by side, so that none waits long for the one before.
+            // Three separate sums, so that additions need not wait for each other.
             let mut of_columns = y;
             for b in 0..3 {
                 of_columns[b] = self.times_column(b, a, &rotation[b]);
@@ -87,7 +87,7 @@ impl CollinearityCost {
         Columns(y)
     }
 
-    /// Returns part `a` of the product of `Ω` with a vector that is zero but in column `b`.
+    /// Returns part `a` of the product of `Ω` with a vector that is zero outside column `b`.
     #[inline(always)]
     fn times_column<A: Arithmetic>(&self, b: usize, a: usize, column: &[Four<A>; 3]) -> Four<A> {
         let [x, y, z] = *column;
@@ -105,8 +105,8 @@ impl CollinearityCost {
 
     /// Returns `Jᵀ Ω J` for the three turns `R [e_k]×`, `J` their columns as vectors.
     ///
-    /// Turn `k` has two columns that are not zero: with `(i, j, k)` in cyclic order, column `i` is
-    /// `r_j` and column `j` is `−r_i`.
+    /// Rotation `k` has two non-zero columns: with `(i, j, k)` in cyclic order, column `i` is `r_j` and column `j` is
+    /// `−r_i`.
     #[inline(always)]
     pub(crate) fn curvature<A: Arithmetic>(
         &self,
@@ -135,7 +135,7 @@ impl CollinearityCost {
         Matrix3::new(m11, m21, m31, m21, m22, m32, m31, m32, m33)
     }
 
-    /// Returns where the markers' mean lies in the camera frame for a given rotation, m.
+    /// Returns the position of the markers' mean in the camera frame for a given rotation, m.
     ///
     /// # Source
     /// Ding, Wei, Wang 2011, Eq. (13), for centred points.
@@ -150,13 +150,13 @@ impl CollinearityCost {
         Vector3::new(centre[0], centre[1], centre[2])
     }
 
-    /// Returns the form's coefficients of [`products`].
+    /// Returns the form's coefficients, in the order of [`products`].
     pub(crate) fn coefficients(&self) -> [f64; PRODUCTS] {
         let mut coefficients = [0.0; PRODUCTS];
         let mut place = 0;
         for j in 0..9 {
             for i in 0..=j {
-                // Ω is symmetric: what is off its diagonal counts twice.
+                // Ω is symmetric, so off-diagonal entries count twice.
                 let count = if i == j { 1.0 } else { 2.0 };
                 coefficients[place] = count * self.omega[j][i / 3][i % 3];
                 place += 1;
@@ -179,11 +179,11 @@ impl CollinearityCost {
     }
 }
 
-/// Products of two of nine entries.
+/// Number of products of two of nine entries.
 pub(crate) const PRODUCTS: usize = 45;
 
-/// Returns the products of each two entries of a rotation, for evaluating the form at rotations that
-/// are known beforehand.
+/// Returns the products of all pairs of entries of a rotation, to evaluate the form at rotations that are known in
+/// advance.
 pub(crate) fn products(rotation: &Rotation3<f64>) -> [f64; PRODUCTS] {
     let r = rotation.matrix();
     let mut products = [0.0; PRODUCTS];
@@ -194,14 +194,14 @@ pub(crate) fn products(rotation: &Rotation3<f64>) -> [f64; PRODUCTS] {
     products
 }
 
-/// Returns the sums of coefficients times what stands side by side for four.
+/// Returns the sums of coefficients times values, for four vectors of values at once.
 #[inline(always)]
 pub(crate) fn combined<A: Arithmetic>(
     arithmetic: A,
     coefficients: &[f64; PRODUCTS],
     four: &[Lane; PRODUCTS],
 ) -> Lane {
-    // Five sums in turn, so that none waits for the one before it.
+    // Five sums in turn, so that additions need not wait for each other.
     let mut sums = [Four::splat(arithmetic, 0.0); 5];
     for (coefficients, products) in coefficients.chunks_exact(5).zip(four.chunks_exact(5)) {
         for k in 0..5 {
@@ -212,7 +212,7 @@ pub(crate) fn combined<A: Arithmetic>(
     (sums[0] + sums[1] + (sums[2] + sums[3]) + sums[4]).lane()
 }
 
-/// Returns the product of turn `k`'s columns with a vector, four summands that are still to be added.
+/// Returns the product of rotation `k`'s columns with a vector, as four summands that the caller adds.
 #[inline(always)]
 fn turn_times<A: Arithmetic>(rotation: &[Four<A>; 3], k: usize, v: &[Four<A>; 3]) -> Four<A> {
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);

@@ -1,9 +1,9 @@
 //! The object-space error of all points as one quadratic form in the rotation alone.
 //!
-//! With `q = R p + c` the camera coordinates of a marker, `p` taken from the markers' mean, and one
-//! weight matrix `W` a point whose null space is the point's ray, the error is `Σ qᵀ W q`. Its
-//! minimum over `c` is in closed form, `c = T r` with `r = vec(R)` (column-major), which leaves
-//! `E(R) = rᵀ Ω r`: a 9×9 matrix, once a frame, after which no iteration looks at a point again.
+//! With `q = R p + c` the camera coordinates of a marker, `p` relative to the markers' mean, and one weight matrix `W`
+//! per point whose null space is the point's ray, the error is `Σ qᵀ W q`. Its minimum over `c` is in closed form, `c =
+//! T r` with `r = vec(R)` (column-major), which leaves `E(R) = rᵀ Ω r`: a 9×9 matrix, computed once per frame. The
+//! iterations then do not access the points.
 //!
 //! | paper           | here                                     |
 //! |-----------------|------------------------------------------|
@@ -11,8 +11,8 @@
 //! | `t(R)` (13)     | [`CollinearityCost::centre_in_camera`]   |
 //! | `Vᵢ` (11)       | `I − W` of [`object_space_weight`]       |
 //!
-//! Whatever belongs to one column of the rotation stands in one register, its fourth number zero: sums,
-//! columns of `Ω` and of `T` are then used as they are loaded.
+//! The entries of one column of the rotation are kept in one register, with its fourth number zero, so that sums,
+//! columns of `Ω` and of `T` are used as they are loaded.
 
 mod cost;
 mod moments;
@@ -22,5 +22,5 @@ mod tests;
 pub(crate) use cost::{CollinearityCost, PRODUCTS, combined, products};
 pub(crate) use moments::{CollinearityMoments, Weighting, object_space_weight};
 
-/// Where entry `(a, b)` of a symmetric matrix stands in [`super::symmetric3::Symmetric3`].
+/// Index of entry `(a, b)` of a symmetric matrix in [`super::symmetric3::Symmetric3`].
 const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];

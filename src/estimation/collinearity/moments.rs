@@ -1,4 +1,4 @@
-//! The sums over points that the cost is made of.
+//! The sums over points from which the cost is computed.
 
 use crate::camera::Ray;
 use crate::estimation::lanes::four::{Arithmetic, Four, LANES, Lane, Number};
@@ -24,10 +24,10 @@ pub(crate) fn object_space_weight(ray: Ray) -> Symmetric3 {
     ]
 }
 
-/// Which error of a point is summed.
+/// The error of a point that is summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Weighting {
-    /// The paper's object-space error, every point alike.
+    /// The paper's object-space error, with equal weights.
     ObjectSpace,
     /// The squared pixel residual over its variance, times the squared depth, to first order: the cost
     /// of `SQPnP` (Terzakis, Lourakis, ECCV 2020), with a weight for each point.
@@ -35,7 +35,7 @@ pub(crate) enum Weighting {
 }
 
 impl Weighting {
-    /// Returns the weights of a block's points; nothing where there is no point.
+    /// Returns the weights of a block's points; zero for padding.
     #[inline(always)]
     pub(super) fn of<A: Arithmetic>(self, arithmetic: A, block: &Block) -> Symmetric3<Four<A>> {
         let load = |lane| Four::new(arithmetic, lane);
@@ -87,7 +87,7 @@ impl CollinearityMoments {
     pub(crate) fn new<A: Arithmetic>(arithmetic: A, points: &Points, weighting: Weighting) -> Self {
         let mut columns = [[[0.0; LANES]; 3]; MONOMIALS];
         let none = Four::splat(arithmetic, 0.0);
-        // Without distortion, columns and rows do not mix and differ by a factor only.
+        // Without distortion, columns and rows are uncorrelated and differ by a factor only.
         if let (Weighting::Image, Some(ratio)) = (weighting, points.row_by_column_information) {
             let w11 = sums_of(arithmetic, points, weighting, 0);
             let w13 = sums_of(arithmetic, points, weighting, 2);
@@ -122,7 +122,7 @@ impl CollinearityMoments {
 
 /// Returns `Σ w m` over all points for entry `w` of the weights and each monomial `m`.
 ///
-/// Entry by entry: the ten sums of one, and what they are made of, fill the sixteen registers.
+/// Entry by entry, because the ten sums of one entry and their terms fill the sixteen registers.
 #[inline(always)]
 fn sums_of<A: Arithmetic>(
     arithmetic: A,

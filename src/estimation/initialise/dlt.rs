@@ -10,29 +10,27 @@ use crate::geometry::nearest_rotation_by_svd;
 type Matrix12 = SMatrix<f64, 12, 12>;
 type Vector12 = SVector<f64, 12>;
 
-/// Points that the eleven unknowns of a camera matrix need.
+/// Points needed for the eleven unknowns of a camera matrix.
 pub(crate) const MIN_POINTS: usize = 6;
-/// Share of the largest eigenvalue below which a second solution exists: points in one plane, or
-/// on a twisted cubic through the camera.
+/// Below this ratio to the largest eigenvalue, a second solution exists: the points are coplanar, or on a twisted cubic
+/// through the camera.
 const MIN_EIGENVALUE_SHARE: f64 = 1e-12;
 
 /// Returns the rotation part of `camera_from_tanker` from a normalised direct linear transform.
 ///
-/// Rays are moved to their mean and scaled to unit spread (Hartley), markers are taken from a reference
-/// point and scaled to unit spread, the smallest right singular vector of the `2n × 12` matrix gives the camera matrix, its
-/// sign is chosen so that the markers lie in front, and its left 3×3 part is projected onto the
-/// rotations.
+/// Rays are shifted to their mean and scaled to unit spread (Hartley); markers are shifted to a reference point and
+/// scaled to unit spread. The smallest right singular vector of the `2n × 12` matrix is the camera matrix. Its sign is
+/// chosen so that the markers are in front of the camera, and its left 3×3 part is projected onto the rotations.
 ///
 /// # Inputs
 /// * `rays`: `n ≥ 6` undistorted points on the `z = 1` plane.
 /// * `markers_in_tanker`: the same `n` markers in the same order, m, not all in one plane.
-/// * `reference_in_tanker`: m; the tanker's origin as in the paper, or the markers' mean as Hartley has it.
-///   The unit length of the solution weighs other entries then: with noise another rotation results, with a
-///   reference some hundred spreads away none.
+/// * `reference_in_tanker`: m; the tanker's origin as in the paper, or the markers' mean as in Hartley. It
+///   changes how the solution's normalisation weights the entries: with noise the rotation differs, and a reference
+///   some hundred spreads away makes the points appear degenerate.
 ///
 /// # Errors
-/// [`EstimateError::TooFewPoints`]; [`EstimateError::Degenerate`] when the points leave more than one
-/// camera matrix.
+/// [`EstimateError::TooFewPoints`]; [`EstimateError::Degenerate`] if the points permit more than one camera matrix.
 ///
 /// # Source
 /// Ding, Wei, Wang 2011, Eqs. (14)–(16), steps 1–3. DIFFERENCE: normalised coordinates, because the

@@ -1,4 +1,5 @@
-//! No prior: descend from the rotations of the icosahedron, keep every minimum in front of the camera.
+//! Initialisation without a prior: descends from the rotations of the icosahedron and keeps every minimum in front of
+//! the camera.
 
 use std::sync::LazyLock;
 
@@ -10,15 +11,15 @@ use crate::estimation::lanes::four::{Arithmetic, Kernel, LANES, Lane, vectorised
 use crate::estimation::newton::{self, Minimum};
 use crate::estimation::problem::Problem;
 
-/// Rotations of the icosahedral group; none is farther than 44.5° from the nearest of them.
+/// Rotations of the icosahedral group; no rotation is farther than 44.5° from the nearest of them.
 const GROUP_SIZE: usize = 60;
-/// Descents; the right basin was among the best eight in every one of thousands of random frames.
+/// Number of descents; the right basin was among the best eight in all of thousands of random frames.
 const DESCENTS: usize = 8;
-/// Different minima kept.
+/// Largest number of different minima kept.
 pub(crate) const MAX_MINIMA: usize = 4;
 
 static ICOSAHEDRAL_GROUP: LazyLock<[Rotation3<f64>; GROUP_SIZE]> = LazyLock::new(icosahedral_group);
-/// The same, four rotations side by side.
+/// The group's rotations, four side by side.
 static FOURS: LazyLock<[FourRotations; GROUP_SIZE / LANES]> = LazyLock::new(|| {
     std::array::from_fn(|four| {
         let rotations = |lane: usize| ICOSAHEDRAL_GROUP[LANES * four + lane];
@@ -32,7 +33,7 @@ static FOURS: LazyLock<[FourRotations; GROUP_SIZE / LANES]> = LazyLock::new(|| {
     })
 });
 
-/// Numbers of four rotations side by side.
+/// Entries of four rotations side by side.
 #[repr(align(32))]
 struct FourRotations {
     products: [Lane; PRODUCTS],
@@ -40,25 +41,24 @@ struct FourRotations {
     entries: [Lane; 9],
 }
 
-/// What the search found.
+/// Result of the search.
 pub(crate) struct Minima {
     /// Minima with the markers' mean in front of the camera, best first.
     pub(crate) in_front: [Option<Minimum>; MAX_MINIMA],
-    /// The best minimum behind the camera, for the error when there is none in front.
+    /// The best minimum behind the camera, for the error if there is none in front.
     pub(crate) behind: Option<Minimum>,
-    /// Of all descents together that were not given up.
+    /// Iterations of all descents that were not abandoned.
     pub(crate) iterations: u16,
 }
 
-/// Returns the minima of the cost that descents from the best of sixty rotations end in.
+/// Returns the minima of the cost that descents from the best of the sixty rotations reach.
 ///
-/// A descent that will clearly end where nothing counts any more, see [`Problem::negligible_cost`], is given up
-/// on the way.
+/// A descent that will clearly end at a negligible minimum, see [`Problem::negligible_cost`], is abandoned.
 pub(crate) fn search(problem: &Problem) -> Minima {
     search_below(problem, |best| problem.negligible_cost(best))
 }
 
-/// Returns the same; `limit` tells, from the best minimum so far, above which cost others do not matter.
+/// As [`search`]; `limit` returns, for the best minimum so far, the cost above which others are negligible.
 fn search_below(problem: &Problem, limit: impl Fn(&Minimum) -> f64) -> Minima {
     let cost = problem.cost;
     let starts = vectorised(BestStarts { cost });
@@ -85,7 +85,7 @@ fn search_below(problem: &Problem, limit: impl Fn(&Minimum) -> f64) -> Minima {
     found
 }
 
-/// The best few of the group, with their costs; infinite where there is none.
+/// The best starts of the group, with their costs; infinite in unused entries.
 struct BestStarts<'a> {
     cost: &'a CollinearityCost,
 }
@@ -95,14 +95,14 @@ impl Kernel for BestStarts<'_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output {
-        // By insertion: no allocation, and sixty entries need no better sort.
+        // Insertion sort: no allocation, and fast enough for sixty entries.
         let mut starts = [(f64::INFINITY, 0_usize); DESCENTS];
         let coefficients = self.cost.coefficients();
         for (index, four) in FOURS.iter().enumerate() {
             let values = combined(arithmetic, &coefficients, &four.products);
             let depths = self.cost.depths(arithmetic, &four.entries);
             for lane in 0..LANES {
-                // A start behind the camera still descends to the front now and then, but rarely.
+                // A start behind the camera rarely descends to a minimum in front.
                 if depths[lane] > 0.0 {
                     let start = (values[lane], LANES * index + lane);
                     insert(&mut starts, start, |a, b| a.0 < b.0);
@@ -132,7 +132,7 @@ impl Minima {
     }
 }
 
-/// Puts `item` at its place in a sorted array and lets the last one drop off.
+/// Inserts `item` into a sorted array and drops the last one.
 fn insert<T: Copy, const N: usize>(sorted: &mut [T; N], item: T, before: impl Fn(&T, &T) -> bool) {
     if let Some(place) = sorted.iter().position(|other| before(&item, other)) {
         sorted[place..].rotate_right(1);

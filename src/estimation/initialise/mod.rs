@@ -1,6 +1,6 @@
-//! First rotations for an iteration: from the image alone, linearly or by search.
+//! Initial rotations from the image alone: linear, or by search.
 //!
-//! The nominal and the previous attitude need no code of their own: they are the caller's.
+//! The nominal and the previous attitude need no code here: the caller supplies them.
 
 mod dlt;
 mod global;

@@ -4,11 +4,11 @@ use nalgebra::Matrix3;
 
 use super::four::{Arithmetic, Four, Number};
 
-/// A column in each register, its fourth number zero.
+/// One column per register, with its fourth number zero.
 #[derive(Clone, Copy)]
 pub(crate) struct Columns<A: Arithmetic>(pub(crate) [Four<A>; 3]);
 
-/// Each entry of a 3×3 matrix four times, column by column.
+/// Each entry of a 3×3 matrix repeated four times, column by column.
 pub(crate) type Splats<A> = [[Four<A>; 3]; 3];
 
 impl<A: Arithmetic> Columns<A> {
@@ -62,7 +62,7 @@ impl<A: Arithmetic> Columns<A> {
         (a * x).plus(b, y).plus(c, z).total()
     }
 
-    /// Returns each entry four times.
+    /// Returns each entry repeated four times.
     #[inline(always)]
     pub(crate) fn splats(self, arithmetic: A) -> Splats<A> {
         let mut splats = [self.0; 3];

@@ -1,17 +1,16 @@
-//! Four numbers at once, in the widest registers that the processor turns out to have.
+//! Arithmetic on four numbers at once, in the widest registers that the processor supports.
 //!
-//! [`vectorised`] asks the processor and runs a [`Kernel`] with AVX2 and fused multiply-add, or with
-//! plain arrays, which compilers turn into SSE2 or Neon. The two differ by rounding: a fused product
-//! is rounded once less.
+//! [`vectorised`] checks the processor and runs a [`Kernel`] with AVX2 and fused multiply-add, or with plain arrays,
+//! which compilers turn into SSE2 or Neon. The results differ by rounding: a fused product is rounded once less.
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// How many.
+/// Numbers per register.
 pub(crate) const LANES: usize = 4;
 /// Four numbers in memory.
 pub(crate) type Lane = [f64; LANES];
 
-/// What sums over points are made of: one number, or four of them.
+/// The element of sums over points: one number, or four.
 pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
@@ -33,7 +32,7 @@ impl Number for f64 {
     }
 }
 
-/// How four numbers are computed with.
+/// The operations on four numbers.
 pub(crate) trait Arithmetic: Copy {
     type Register: Copy;
     fn load(self, lane: Lane) -> Self::Register;
@@ -51,15 +50,15 @@ pub(crate) trait Arithmetic: Copy {
         b: Self::Register,
         c: Self::Register,
     ) -> Self::Register;
-    /// The sum of each, side by side.
+    /// The sum of each register, side by side.
     fn totals(self, fours: [Self::Register; 4]) -> Self::Register;
-    /// The first of each, the second of each, and so on.
+    /// The first numbers of all registers, then the second ones, and so on.
     fn transposed(self, rows: [Self::Register; 4]) -> [Self::Register; 4];
 }
 
-/// Four numbers with the way to compute with them, which takes no room.
+/// Four numbers with their arithmetic, which is a zero-sized type.
 ///
-/// Aligned, as all lanes in memory should be: half of those that are not lie across two cache lines.
+/// Aligned, as all lanes in memory should be: half of unaligned ones span two cache lines.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 pub(crate) struct Four<A: Arithmetic> {
@@ -193,21 +192,21 @@ pub(crate) fn totals<A: Arithmetic, const N: usize>(fours: &[Four<A>; N]) -> [f6
     totals
 }
 
-/// Tells the compiler to keep sums in memory from one block to the next: more than sixteen registers hold
-/// are otherwise moved about twice a block. It costs no instruction, and changes no value.
+/// Makes the compiler keep sums in memory between blocks: sums that exceed the sixteen registers would otherwise be
+/// moved twice a block. It generates no instruction and changes no value.
 #[inline(always)]
 pub(crate) fn keep_in_memory<T>(sums: &mut T) {
     std::hint::black_box(sums);
 }
 
-/// Work that can be done in any arithmetic. What it calls must be `inline(always)` down to the sums,
-/// or it is compiled for the oldest processor.
+/// An operation that is generic over the arithmetic. Everything that it calls must be `inline(always)`, otherwise it is
+/// compiled for the oldest supported processor.
 pub(crate) trait Kernel {
     type Output;
     fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output;
 }
 
-/// Runs a kernel in the best arithmetic there is.
+/// Runs a kernel with the best available arithmetic.
 #[inline(always)]
 pub(crate) fn vectorised<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -305,7 +304,7 @@ mod x86 {
 
     use super::{Arithmetic, Lane};
 
-    /// AVX2 with fused multiply-add, where the processor has it; asked once.
+    /// AVX2 with fused multiply-add, if the processor has it; checked once.
     pub(super) static AVX2: LazyLock<Option<V3>> = LazyLock::new(V3::try_new);
 
     impl Arithmetic for V3 {
@@ -353,7 +352,7 @@ mod x86 {
 
         #[inline(always)]
         fn totals(self, [a, b, c, d]: [f64x4; 4]) -> f64x4 {
-            // Neighbours first: lower and upper halves of a, b and of c, d.
+            // Adds neighbours first: lower and upper halves of a, b and of c, d.
             let ab = self.avx._mm256_hadd_pd(cast(a), cast(b));
             let cd = self.avx._mm256_hadd_pd(cast(c), cast(d));
             let lower = self.avx._mm256_permute2f128_pd::<0x20>(ab, cd);

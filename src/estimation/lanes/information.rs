@@ -1,9 +1,9 @@
-//! The normal equations of a pose by their blocks: attitude, position, and what ties them.
+//! The normal equations of a pose by their blocks: attitude, position, and their coupling.
 //!
-//! With `T`, `M`, `P` the information of turn, turn and position, and position, the attitude knows
-//! `S = T − M P⁻¹ Mᵀ` once the position is free: `S⁻¹` is its covariance, and all else follows from
-//! `K = M P⁻¹` in products. Two closed inverses of 3×3 take half the time of a 6×6 factorisation, whose
-//! six divisions wait for each other.
+//! With `T`, `M`, `P` the blocks for rotation, rotation and position, and position, the information of the attitude
+//! with free position is `S = T − M P⁻¹ Mᵀ`. `S⁻¹` is its covariance, and everything else follows from `K = M P⁻¹` by
+//! products. Two closed inverses of 3×3 take half the time of a 6×6 factorisation, whose six divisions depend on each
+//! other.
 
 use nalgebra::{Matrix6, Vector3};
 
@@ -13,19 +13,19 @@ use crate::geometry::PoseCovariance;
 /// Rotation before position.
 pub(crate) type Vector = [f64; 6];
 
-/// Determinants below this share of their diagonal's product mean a direction that the points leave free.
+/// A determinant below this share of the product of the diagonal means that the points leave a direction undetermined.
 const MIN_SHARE: f64 = 1e-13;
 
 /// `JᵀJ` of whitened residuals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Information {
     pub(crate) turn: Symmetric3,
-    /// Rows: turn; columns: position.
+    /// Rows: rotation; columns: position.
     pub(crate) mixed: [[f64; 3]; 3],
     pub(crate) position: Symmetric3,
 }
 
-/// What is needed to solve with an [`Information`].
+/// The factors needed to solve with an [`Information`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Solver {
     /// `S⁻¹`.
@@ -51,7 +51,7 @@ impl Information {
         )
     }
 
-    /// Returns the same with its diagonal raised by a share.
+    /// Returns the matrix with its diagonal raised by a share.
     #[inline(always)]
     pub(crate) fn damped(&self, share: f64) -> Self {
         let raised = |block: Symmetric3| {
@@ -66,8 +66,8 @@ impl Information {
         }
     }
 
-    /// Returns what solves with it; `None` unless it is positive definite, and far enough from singular for
-    /// its inverse to mean something.
+    /// Returns the factors; `None` unless the matrix is positive definite and well enough conditioned for its inverse
+    /// to be meaningful.
     #[inline(always)]
     pub(crate) fn solver(&self) -> Option<Solver> {
         let (t, p) = (&self.turn, &self.position);
@@ -113,7 +113,7 @@ impl Solver {
         [turn[0], turn[1], turn[2], pulled(0), pulled(1), pulled(2)]
     }
 
-    /// Returns whether its numbers are numbers: one that is not makes their sum so.
+    /// Returns whether all numbers are finite; a NaN or infinity makes their sum so.
     #[inline(always)]
     pub(crate) fn is_finite(&self) -> bool {
         let [c, p] = [&self.turn_covariance, &self.position_inverse]
@@ -144,10 +144,10 @@ impl Solver {
         )
     }
 
-    /// Returns the covariance of the attitude and of another point of the same body, from which `arm` leads
-    /// to the point of the normal equations; exactly symmetric.
+    /// Returns the covariance of the attitude and of another point of the same body, with `arm` from that point to the
+    /// point of the normal equations; exactly symmetric.
     ///
-    /// A turn moves that point by `arm × δθ` more, so that `K + [arm]×` stands in place of `K`.
+    /// A rotation moves that point by `arm × δθ` more, so `K + [arm]×` replaces `K`.
     #[inline(always)]
     pub(crate) fn covariance_of_point(&self, arm: &Vector3<f64>) -> PoseCovariance {
         let k = &self.lever;

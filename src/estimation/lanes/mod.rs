@@ -1,4 +1,4 @@
-//! Four numbers at once: the arithmetic that the solver's time goes into, behind one door.
+//! Arithmetic on four numbers at once, in which the solver spends most of its time.
 //!
 //! | file | what |
 //! | --- | --- |
@@ -10,23 +10,23 @@
 //!
 //! # How to read a kernel
 //!
-//! A kernel is a struct with the inputs, and one `run` that is generic over `A: Arithmetic`.
-//! [`four::vectorised`] runs it with AVX2 where the processor has it and with plain arrays elsewhere, so all below `run` is compiled once for AVX2 and once for plain arrays.
+//! A kernel is a struct with the inputs and a function `run` that is generic over `A: Arithmetic`. [`four::vectorised`]
+//! runs it with AVX2 if the processor has it and with plain arrays otherwise, so everything below `run` is compiled
+//! twice.
 //!
 //! * A [`four::Lane`] is four numbers in memory, a [`four::Four`] the same four in a register. Operators
-//!   work number by number: `a * b` is four products.
+//!   work element by element: `a * b` is four products.
 //! * Read `Four` as if it were `f64`: the formula is the same, for four points, or four attitudes, side by side.
 //! * `a.plus(b, c)` is `a + b c`, `a.minus(b, c)` is `a − b c`, rounded once where the processor fuses them.
 //!   The order of the operations is part of the result: another order gives other last bits.
 //! * [`four::totals`] adds the four numbers of each sum at the end of a loop over blocks.
-//! * A block that is not full is filled with points of no weight, so no loop has a remainder.
+//! * The last block is padded with points of zero weight, so no loop has a remainder.
 //!
 //! # How to change one
 //!
-//! Everything under `run` is `#[inline(always)]`: a function that stays a call there is compiled without
-//! AVX2 and passes its registers through memory. Closures and `array::map` have been left as calls on the
-//! way of the descent, so new loops go by index over fixed sizes. Measure with
-//! `cargo bench --bench stages`, before and after, side by side.
+//! Everything under `run` is `#[inline(always)]`: a function that is not inlined is compiled without AVX2 and passes
+//! its registers through memory. Closures and `array::map` in the descent were not always inlined, so new loops use
+//! indices over fixed sizes. Measure with `cargo bench --bench stages`, before and after, side by side.
 
 pub(crate) mod columns;
 pub(crate) mod four;

@@ -1,4 +1,4 @@
-//! A frame's points side by side, four to a block, so that sums over them run in vector registers.
+//! A frame's points in blocks of four, so that sums over them use vector registers.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use smallvec::SmallVec;
@@ -7,25 +7,26 @@ use super::four::{Arithmetic, Four, LANES, Lane, Number, Plain, totals};
 use crate::camera::{Camera, Ray};
 use crate::estimation::{EstimateError, Observation};
 
-/// Points kept without the heap.
+/// Points kept on the stack.
 pub(crate) const INLINE_POINTS: usize = 64;
 const INLINE_BLOCKS: usize = INLINE_POINTS / LANES;
-/// Room for a frame's blocks; six kilobytes that are filled where they stand, never moved.
+/// Storage for a frame's blocks; six kilobytes that are filled in place and never moved.
 pub(crate) type Blocks = SmallVec<[Block; INLINE_BLOCKS]>;
-/// Least second moment of the markers about their line, relative to the first: a thousandth in length.
+/// Least second moment of the markers about their line, relative to the first; corresponds to a ratio of lengths of
+/// 1e-3.
 const MIN_WIDTH_SHARE: f64 = 1e-6;
 
-/// Four points. What is missing to four at the end has no weight and its marker lies in the mean.
+/// Four points. The last block is padded with points of zero weight whose marker is at the mean.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(32))]
 pub(crate) struct Block {
     /// Marker from the markers' mean, tanker frame, m.
     pub(crate) marker: [Lane; 3],
-    /// Measured ray: x, y on the plane `z = 1`.
+    /// Detected ray: x, y on the plane `z = 1`.
     pub(crate) ray: [Lane; 2],
-    /// Inverse covariance of the measured ray: 11, 12, 22; a pinhole has no 12.
+    /// Inverse covariance of the detected ray: 11, 12, 22; 12 is zero for a pinhole.
     pub(crate) information: [Lane; 3],
-    /// px²; zero where there is no point.
+    /// px²; zero for padding.
     pub(crate) variance: Lane,
 }
 
@@ -33,7 +34,7 @@ pub(crate) struct Block {
 #[derive(Debug)]
 pub(crate) struct Points<'a> {
     pub(crate) blocks: &'a [Block],
-    /// Information of rows over that of columns, for a camera without distortion: the same for all points.
+    /// Information of rows relative to that of columns, for a camera without distortion: the same for all points.
     pub(crate) row_by_column_information: Option<f64>,
     /// Mean of the markers, the reference point of all fits, m, tanker frame.
     pub(crate) mean: Point3<f64>,
@@ -77,9 +78,8 @@ struct Measurement {
 impl<'a> Points<'a> {
     /// Returns the points with their rays, about the markers' mean.
     ///
-    /// # Errors
-    /// [`EstimateError::NoRay`], or [`EstimateError::Degenerate`] for markers on one line, about
-    /// which the tanker could turn freely.
+    /// [`EstimateError::NoRay`], or [`EstimateError::Degenerate`] for collinear markers, whose rotation about their
+    /// line is undetermined.
     #[inline(always)]
     pub(crate) fn new(
         arithmetic: impl Arithmetic,
@@ -109,7 +109,7 @@ impl<'a> Points<'a> {
         Ok(points)
     }
 
-    /// Returns points whose rays are given, all of the same weight.
+    /// Returns points with given rays and equal weights.
     pub(crate) fn from_rays(
         rays: &[Ray],
         markers_in_tanker: &[Point3<f64>],
@@ -172,7 +172,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Fills in what a camera without distortion measured; false when a pixel has no ray.
+/// Fills in the rays of a camera without distortion; false if a pixel has no ray.
 #[inline(always)]
 fn measure_four(
     arithmetic: impl Arithmetic,
@@ -181,7 +181,7 @@ fn measure_four(
     four: &[Observation],
     block: &mut Block,
 ) -> bool {
-    // What is missing to four repeats the last point, without any weight.
+    // Padding repeats the last point with zero weight.
     let seen = match four {
         [a, b, c, d] => [a, b, c, d],
         [a, b, c] => [a, b, c, c],
@@ -227,14 +227,14 @@ fn measure_four(
     block.ray = [x.lane(), y.lane()];
     block.information = [(wu * wu).lane(), [0.0; LANES], (wv * wv).lane()];
     block.variance = (sigma * sigma * there).lane();
-    // A sum is finite only if its terms are; one of them too large is left to the careful way.
+    // A sum is finite only if its terms are. If a term is too large, the caller checks point by point.
     (x + y).total().is_finite()
 }
 
 fn measure(camera: &Camera, seen: &Observation) -> Result<Measurement, EstimateError> {
     let no_ray = |cause| EstimateError::NoRay { id: seen.id, cause };
     let ray = camera.ray_from_pixel(seen.pixel).map_err(no_ray)?;
-    // A pixel that has a ray has a derivative there.
+    // A pixel with a ray has a derivative there.
     let (_, by_ray) = camera.project(ray).ok_or(EstimateError::SINGULAR)?;
     let whitened = by_ray / seen.sigma_px;
     let information = whitened.tr_mul(&whitened);
@@ -245,7 +245,7 @@ fn measure(camera: &Camera, seen: &Observation) -> Result<Measurement, EstimateE
     })
 }
 
-/// Four numbers that stand side by side in an observation: marker and column.
+/// Returns four numbers of an observation that are adjacent in memory: marker and column.
 #[inline(always)]
 fn marker_and_column<A: Arithmetic>(arithmetic: A, seen: &Observation) -> Four<A> {
     let marker = &seen.marker_in_tanker;
@@ -255,7 +255,7 @@ fn marker_and_column<A: Arithmetic>(arithmetic: A, seen: &Observation) -> Four<A
 /// Returns the mean of the markers, m.
 #[inline(always)]
 fn mean_marker(arithmetic: impl Arithmetic, observations: &[Observation]) -> Point3<f64> {
-    // Four sums in turn, so that no addition waits for the one before it.
+    // Four sums in turn, so that additions need not wait for each other.
     let mut sums = [Four::splat(arithmetic, 0.0); 4];
     let (fours, rest) = observations.as_chunks::<4>();
     for four in fours {
@@ -278,7 +278,7 @@ pub(crate) fn mean<T>(items: &[T], marker: impl Fn(&T) -> &Point3<f64>) -> Point
 
 #[inline(always)]
 fn check_spread(s: &Matrix3<f64>) -> Result<(), EstimateError> {
-    // The second invariant is about the product of the two largest eigenvalues.
+    // The second invariant is approximately the product of the two largest eigenvalues.
     let second = s.m11 * s.m22 + s.m22 * s.m33 + s.m33 * s.m11
         - (s.m12 * s.m12 + s.m23 * s.m23 + s.m13 * s.m13);
     if second > MIN_WIDTH_SHARE * s.trace() * s.trace() {

@@ -1,10 +1,10 @@
-//! Symmetric 3×3 matrices in closed form: one division an inverse, and nothing that waits for another entry.
+//! Symmetric 3×3 matrices in closed form: one division per inverse, and entries that do not depend on each other.
 
 /// A symmetric 3×3 matrix by its upper triangle: 11, 12, 13, 22, 23, 33.
 pub(crate) type Symmetric3<T = f64> = [T; 6];
 
-/// Returns `A⁻¹`; `None` unless the matrix is positive definite and its determinant is at least this share
-/// of the product of `scale`, the entries that its diagonal was made of.
+/// Returns `A⁻¹`; `None` unless the matrix is positive definite and its determinant is at least this share of the
+/// product of `scale`, the diagonal before any subtraction.
 #[inline(always)]
 pub(crate) fn positive_inverse(
     a: &Symmetric3,
@@ -14,7 +14,7 @@ pub(crate) fn positive_inverse(
     let [a11, _, _, a22, _, _] = *a;
     let cofactors = cofactors(a);
     let determinant = determinant(a, &cofactors);
-    // The leading minors. A comparison with what is not a number is false.
+    // The leading minors. A comparison with NaN is false.
     let is_definite = a11 > 0.0
         && a22 > 0.0
         && cofactors[5] > 0.0

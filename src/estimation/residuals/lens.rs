@@ -1,4 +1,4 @@
-//! Points seen through any lens, one at a time: the lens model is evaluated at the prediction.
+//! Points of a camera with any lens, one at a time: the lens model is evaluated at the prediction.
 
 use nalgebra::{Matrix2x3, Point3, Vector2};
 
@@ -8,7 +8,7 @@ use crate::camera::{Camera, Ray};
 use crate::estimation::Observation;
 use crate::estimation::centred_pose::CentredPose;
 
-/// Points seen through any lens, one at a time: the lens model is evaluated at the prediction.
+/// Points of a camera with any lens, one at a time: the lens model is evaluated at the prediction.
 pub(crate) struct LensResiduals<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) observations: &'a [Observation],

@@ -1,8 +1,8 @@
 //! Residuals at a pose, and the normal equations of one Gauss-Newton step, in whitened pixels.
 //!
-//! With `a = R p`, `M = DᵀD` and `s = Dᵀ r` of a point (`D` its whitened derivative, `r` its whitened
-//! residual), the blocks of `JᵀJ` are `M`, `[a]× M` and `[a]× M [a]×ᵀ`, and the gradient is `s` and
-//! `a × s`: less work than the products of the rows of `J`.
+//! With `a = R p`, `M = DᵀD` and `s = Dᵀ r` of a point (`D` its whitened derivative, `r` its whitened residual), the
+//! blocks of `JᵀJ` are `M`, `[a]× M` and `[a]× M [a]×ᵀ`, and the gradient is `s` and `a × s`. This takes fewer
+//! operations than the products of the rows of `J`.
 
 mod lens;
 mod pinhole;
@@ -35,16 +35,16 @@ pub(crate) struct Slope {
     pub(crate) squared_residuals_px: f64,
 }
 
-/// What is minimised.
+/// A sum of squared residuals to be minimised.
 pub(crate) trait Residuals {
-    /// What a linearisation leaves to the slopes nearby.
+    /// What a linearisation passes on to slopes nearby.
     type Kept: Copy;
-    /// Share by which the sum may rise in a step that is taken; 0 where the weights do not depend on the pose.
+    /// Share by which the sum may rise in an accepted step; 0 if the weights do not depend on the pose.
     const RISE: f64;
 
-    /// Returns the residuals' sums at a pose; `None` when a point has no pixel there.
+    /// Returns the sums at a pose; `None` if a point has no pixel there.
     fn linearise(&self, pose: &CentredPose) -> Option<Linearised<Self::Kept>>;
 
-    /// Returns the same without second derivatives, where that is less work; `kept` is from a pose nearby.
+    /// As [`Self::linearise`] without second derivatives, where that saves time; `kept` is from a pose nearby.
     fn slope(&self, pose: &CentredPose, kept: &Self::Kept) -> Option<Slope>;
 }

@@ -1,4 +1,4 @@
-//! Points seen by a camera without distortion, four at a time.
+//! Points of a camera without distortion, four at a time.
 
 use super::sums::{SlopeSums, Sums, Weight};
 use super::{Linearised, Residuals, Slope};
@@ -6,7 +6,7 @@ use crate::estimation::centred_pose::CentredPose;
 use crate::estimation::lanes::four::{Arithmetic, Four, LANES, Lane, Number, keep_in_memory};
 use crate::estimation::lanes::points::{Block, Points};
 
-/// Points seen by a camera without distortion, four at a time.
+/// Points of a camera without distortion, four at a time.
 pub(crate) struct PinholeResiduals<'a, A> {
     pub(crate) arithmetic: A,
     pub(crate) points: &'a Points<'a>,
@@ -54,7 +54,7 @@ impl<A: Arithmetic> Residuals for PinholeResiduals<'_, A> {
     }
 }
 
-/// Four points, seen from a pose.
+/// Four points as seen from a pose.
 struct Seen<A: Arithmetic> {
     arm: [Four<A>; 3],
     weight: Weight<Four<A>>,
@@ -66,12 +66,12 @@ struct Seen<A: Arithmetic> {
 }
 
 impl<A: Arithmetic> PinholeResiduals<'_, A> {
-    /// Gives each block to `add`; returns whether all points were in front of the camera.
+    /// Passes each block to `add`; returns whether all points were in front of the camera.
     #[inline(always)]
     fn visit(&self, pose: &CentredPose, mut add: impl FnMut(Seen<A>)) -> bool {
         let pose = PoseInRegisters::new(self.arithmetic, pose);
         let mut nearest = [f64::INFINITY; LANES];
-        // A block ahead: its division runs while the sums of the one before are taken.
+        // One block ahead: its division runs while the previous block is summed.
         let blocks = self.points.blocks;
         let Some(first) = blocks.first() else {
             return false;
@@ -90,12 +90,12 @@ impl<A: Arithmetic> PinholeResiduals<'_, A> {
                 };
             }
         }
-        // A depth that is not a number makes the squared residuals so too.
+        // If a depth is NaN, so are the squared residuals.
         nearest.iter().all(|depth| *depth > 0.0)
     }
 }
 
-/// Where four points lie.
+/// The positions of four points.
 #[derive(Clone, Copy)]
 struct Sight<A: Arithmetic> {
     /// From the markers' mean, camera axes, m.
@@ -104,7 +104,7 @@ struct Sight<A: Arithmetic> {
     inverse_depth: Four<A>,
 }
 
-/// Each number of a pose four times.
+/// Each number of a pose repeated four times.
 struct PoseInRegisters<A: Arithmetic> {
     rotation: [[Four<A>; 3]; 3],
     centre_in_camera: [Four<A>; 3],
@@ -128,7 +128,7 @@ impl<A: Arithmetic> PoseInRegisters<A> {
 }
 
 impl<A: Arithmetic> PoseInRegisters<A> {
-    /// Returns where a block's points lie.
+    /// Returns the positions of a block's points.
     #[inline(always)]
     fn sight(&self, arithmetic: A, block: &Block) -> Sight<A> {
         let load = |lane: &Lane| Four::new(arithmetic, *lane);
@@ -148,7 +148,7 @@ impl<A: Arithmetic> PoseInRegisters<A> {
         }
     }
 
-    /// Returns what the residuals of a block are made of.
+    /// Returns the terms of a block's residuals.
     #[inline(always)]
     fn see(&self, arithmetic: A, block: &Block, sight: &Sight<A>) -> Seen<A> {
         let load = |lane: &Lane| Four::new(arithmetic, *lane);

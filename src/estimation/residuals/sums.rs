@@ -1,4 +1,4 @@
-//! The sums over points that residuals and their derivatives are made of.
+//! Sums over points for residuals and their derivatives.
 
 use super::{Linearised, Slope};
 use crate::estimation::lanes::four::{Arithmetic, Four, Number, totals};
@@ -16,7 +16,7 @@ pub(crate) struct Sums<N> {
     pub(crate) slope: SlopeSums<N>,
 }
 
-/// `M` of a point; without distortion it has no 12.
+/// `M` of a point; 12 is zero without distortion.
 #[derive(Clone, Copy)]
 pub(crate) struct Weight<N> {
     pub(crate) m11: N,
