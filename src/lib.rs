@@ -1,15 +1,14 @@
-//! Vision-based relative navigation for autonomous aerial refuelling: pixels of known beacons on a
-//! tanker in, the tanker's pose in the camera out, with a covariance that means what it says.
+//! Vision-based relative navigation for autonomous aerial refuelling: from pixels of known beacons on a tanker to the
+//! tanker's pose in the camera, with a realistic covariance.
 //!
-//! The house has floors; dependencies point downwards only, and one frame's way through it is one
-//! straight line that node, tools, Monte Carlo and tests share:
+//! The layers depend downwards only. Node, tools, Monte Carlo and tests process a frame with the same call:
 //!
 //! ```text
-//! bin, ros            the only floors that know files, clocks, threads and ros2-client
+//! bin, ros            the only layers with files, clocks, threads and ros2-client
 //! simulation          seeded approaches and synthetic detections, for tools and tests
-//! picture             what a frame looks like in space, for tools that draw
-//! pipeline, config    one straight line a frame; raw parameters -> checked settings
-//! refuelling          the receptacle before the probe, and how sure that is
+//! picture             the geometry of a frame in space, for display
+//! pipeline, config    the processing of one frame; raw parameters -> checked settings
+//! refuelling          the receptacle relative to the probe, with probabilities
 //! tracking, frames    a motion from poses over time; poses for flight stacks
 //! estimation          a pose from known markers and pixels: initialise, iterate, refine, judge, covariance
 //! camera, target      pixel <-> ray; marker id -> point on the tanker

@@ -1,7 +1,7 @@
-//! What a frame looks like in space: points, rays, ellipsoid and frustum in the camera frame, for tools that draw.
+//! The geometry of a frame in space: points, rays, ellipsoid and frustum in the camera frame, for display.
 //!
-//! Knows `pipeline` and what is below it; never a message, a colour or a topic. Of a frame that was refused it shows
-//! the camera alone: a doubtful pose that is drawn looks like a good one.
+//! Depends on `pipeline` and the layers below, and not on messages, colours or topics. For a refused frame only the
+//! camera is shown: a doubtful pose would look like a good one.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 
@@ -9,10 +9,10 @@ use crate::camera::{Camera, Pixel};
 use crate::pipeline::{Detection, FrameOutcome};
 use crate::target::MarkerMap;
 
-/// Half axes of the ellipsoid in standard deviations: the position lies within with a probability of 97 %.
+/// Half axes of the ellipsoid in standard deviations: the position is inside with a probability of 97 %.
 pub const ELLIPSOID_SIGMAS: f64 = 3.0;
 
-/// How far ahead the frustum of the camera reaches, m.
+/// Depth of the camera's frustum, m.
 pub const FRUSTUM_DEPTH_M: f64 = 2.0;
 
 /// One detection of a trusted frame.
@@ -20,13 +20,13 @@ pub const FRUSTUM_DEPTH_M: f64 = 2.0;
 pub struct Seen {
     /// Marker id.
     pub id: u32,
-    /// Where the pose puts the marker, camera frame, m.
+    /// Position of the marker according to the pose, camera frame, m.
     pub marker_in_camera: Point3<f64>,
-    /// Where the detection's ray is at that depth, camera frame, m.
+    /// Point of the detection's ray at that depth, camera frame, m.
     pub detected_in_camera: Point3<f64>,
 }
 
-/// Where the position of the tanker may be.
+/// The uncertainty of the tanker's position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipsoid {
     /// The estimated position, camera frame, m.
@@ -37,19 +37,19 @@ pub struct Ellipsoid {
     pub half_axes_m: Vector3<f64>,
 }
 
-/// All that can be drawn of a frame.
+/// Everything that can be displayed of a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Picture {
-    /// Detections that the pose rests on.
+    /// Detections used for the pose.
     pub used: Vec<Seen>,
     /// Detections that were excluded as wrong.
     pub rejected: Vec<Seen>,
-    /// Where the pose puts the markers that were not detected, camera frame, m.
+    /// Positions, according to the pose, of the markers that were not detected, camera frame, m.
     pub unseen_in_camera: Vec<Point3<f64>>,
     /// The uncertainty of the position; `None` without a trusted pose.
     pub ellipsoid: Option<Ellipsoid>,
-    /// Corners of the image at [`FRUSTUM_DEPTH_M`]: top left, top right, bottom right, bottom left; `None` where the
-    /// size of the image is not known or the lens model does not reach its corners.
+    /// Corners of the image at [`FRUSTUM_DEPTH_M`]: top left, top right, bottom right, bottom left; `None` if the size
+    /// of the image is unknown or the lens model does not reach its corners.
     pub frustum: Option<[Point3<f64>; 4]>,
 }
 
@@ -57,9 +57,9 @@ impl Picture {
     /// Returns the picture of a frame.
     ///
     /// # Inputs
-    /// * `camera`: that of the frame.
-    /// * `detections`: of the frame, as they were given to the pipeline.
-    /// * `outcome`: what became of it.
+    /// * `camera`: the camera of the frame.
+    /// * `detections`: of the frame, as passed to the pipeline.
+    /// * `outcome`: of the frame.
     #[must_use]
     pub fn new(
         camera: &Camera,
@@ -130,7 +130,7 @@ fn ellipsoid(camera_from_tanker: &Isometry3<f64>, covariance: &Matrix3<f64>) -> 
     let eigen = SymmetricEigen::new(*covariance);
     let mut axes = eigen.eigenvectors;
     if axes.determinant() < 0.0 {
-        axes.column_mut(2).neg_mut(); // an ellipsoid looks the same in its mirror image
+        axes.column_mut(2).neg_mut(); // mirroring does not change an ellipsoid
     }
     Ellipsoid {
         centre_in_camera: camera_from_tanker.translation.vector.into(),
@@ -145,7 +145,7 @@ fn ellipsoid(camera_from_tanker: &Isometry3<f64>, covariance: &Matrix3<f64>) -> 
 
 fn frustum(camera: &Camera) -> Option<[Point3<f64>; 4]> {
     let (width, height) = camera.image_size_px()?;
-    // The outer edges of the border pixels: their centres are whole numbers.
+    // The outer edges of the border pixels, whose centres are integers.
     let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
     let corner = |u, v| point_of_pixel(camera, Pixel { u, v }, FRUSTUM_DEPTH_M);
     Some([

@@ -1,10 +1,10 @@
-//! Numbers and words in messages for people.
+//! Numbers and words in messages.
 
 pub(crate) use ros2_node::text::{MAX_NAME_BYTES, clip, list, quoted};
 #[cfg(feature = "ros")]
 pub(crate) use ros2_node::text::{echoed, line, path};
 
-/// Returns a number with three significant digits: residuals and depths go from nanometres to kilometres.
+/// Returns a number with three significant digits: residuals and depths range from nanometres to kilometres.
 pub(crate) fn digits(value: f64) -> String {
     let size = value.abs();
     match size {

@@ -1,8 +1,8 @@
-//! Configuration text -> plain values that still know where they stood.
+//! Reads configuration text into plain values with their positions.
 //!
-//! Knows YAML and nothing else: neither files (a caller brings text and the name of its source) nor
-//! what the values mean. Strict where a slip would go unseen: unknown and repeated keys, merge keys
-//! and unknown tags are errors; nothing is interpolated.
+//! Depends on YAML only, and not on files (the caller supplies text and the name of its source) or the meaning of
+//! values. Strict where a mistake would go unnoticed: unknown and repeated keys, merge keys and unknown tags are
+//! errors; nothing is interpolated.
 
 use std::fmt;
 
@@ -12,17 +12,17 @@ use serde_saphyr::{DuplicateKeyPolicy, MergeKeyPolicy};
 
 use crate::text::quoted;
 
-/// A place that an error can point to: `config/tankers/paper.yaml:7:9`.
+/// The position of an error: `config/tankers/paper.yaml:7:9`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// What holds the text, usually a path.
+    /// Name of the text, usually a path.
     pub source: String,
-    /// Line and column, from 1; `None` where the fault has no place in a text.
+    /// Line and column, from 1; `None` if the error has no position in the text.
     pub line_column: Option<(u64, u64)>,
 }
 
 impl Place {
-    /// Returns the place of a source as a whole.
+    /// Returns the position of a whole source.
     #[must_use]
     pub fn whole(source: &str) -> Self {
         Self {
@@ -31,7 +31,7 @@ impl Place {
         }
     }
 
-    /// Returns the place that the YAML reader gave to a value.
+    /// Returns the position that the YAML reader reports for a value.
     #[must_use]
     pub fn at(source: &str, location: Location) -> Self {
         let known = location != Location::UNKNOWN;
@@ -41,7 +41,7 @@ impl Place {
         }
     }
 
-    /// Returns the line, from 1, where it is known.
+    /// Returns the line, from 1, if known.
     #[must_use]
     pub fn line(&self) -> Option<u64> {
         self.line_column.map(|(line, _)| line)
@@ -57,23 +57,23 @@ impl fmt::Display for Place {
     }
 }
 
-/// Text that is no YAML, or YAML of another shape than asked for.
+/// Text that is not YAML, or YAML of another structure than expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {reason}")]
 pub struct YamlError {
     /// Where the reader stopped.
     pub place: Place,
-    /// What it expected and found.
+    /// The expected and the received value.
     pub reason: String,
 }
 
-/// Returns the value that a YAML text describes.
+/// Returns the value in a YAML text.
 ///
 /// Fields of type [`serde_saphyr::Spanned`] keep their line and column. `T` should
 /// `deny_unknown_fields`.
 ///
 /// # Errors
-/// [`YamlError`] with the place in `source`: syntax, a wrong type, a missing, unknown or repeated key.
+/// [`YamlError`] with the position in `source`: syntax, a wrong type, a missing, unknown or repeated key.
 pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlError> {
     serde_saphyr::from_str_with_options(text, strict()).map_err(|error| {
         let location = error.location().unwrap_or(Location::UNKNOWN);
@@ -85,7 +85,7 @@ pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlErro
     })
 }
 
-/// Returns the error for the author of the file; the parser's own message names Rust types.
+/// Returns the error in terms of the file; the parser's own message names Rust types.
 fn plainly(error: &Error, text: &str, location: Location) -> String {
     let got = || match word_at(text, location) {
         "" => "nothing".to_owned(),
@@ -118,7 +118,7 @@ fn plainly(error: &Error, text: &str, location: Location) -> String {
     }
 }
 
-/// What YAML and Rust call a thing, as people do.
+/// Returns the common word for a type of YAML or Rust.
 fn in_words(kind: &str) -> &str {
     match kind {
         "i8" | "i16" | "i32" | "i64" | "u8" | "u16" | "u32" | "u64" => "a whole number",
@@ -130,7 +130,7 @@ fn in_words(kind: &str) -> &str {
     }
 }
 
-/// Returns the value that begins at a place, up to the end of its line at most.
+/// Returns the value that begins at a position, at most up to the end of its line.
 fn word_at(text: &str, location: Location) -> &str {
     let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
     let line = text
@@ -141,10 +141,11 @@ fn word_at(text: &str, location: Location) -> &str {
         .char_indices()
         .nth(index(location.column()).wrapping_sub(1));
     let rest = begin.map_or("", |(begin, _)| &line[begin..]);
-    // Of a key without a value the place is that of its colon.
+    // For a key without a value, the position is that of its colon.
     let rest = rest.strip_prefix(':').unwrap_or(rest);
     let rest = rest.split(" #").next().unwrap_or_default().trim_start();
-    // Lists and maps in brackets are shown whole, single values without what closes the one around them.
+    // Lists and maps in brackets are returned whole, single values without the bracket that closes the list around
+    // them.
     let end = if rest.starts_with(['[', '{']) {
         rest.len()
     } else {
@@ -153,7 +154,7 @@ fn word_at(text: &str, location: Location) -> &str {
     rest[..end].trim()
 }
 
-/// Options under which nothing is accepted that a reader of the file would not expect.
+/// Options that accept nothing a reader of the file would not expect.
 fn strict() -> Options {
     serde_saphyr::options! {
         duplicate_keys: DuplicateKeyPolicy::Error,

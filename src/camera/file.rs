@@ -20,7 +20,9 @@ pub enum CameraFileError {
     #[error(transparent)]
     Yaml(#[from] YamlError),
     /// A matrix whose size is not the format's.
-    #[error("{place}: {matrix} must have {need_rows} x {need_cols} entries, but is declared as {rows} x {cols}")]
+    #[error(
+        "{place}: {matrix} must have {need_rows} x {need_cols} entries, but is declared as {rows} x {cols}"
+    )]
     MatrixSize {
         place: Place,
         matrix: &'static str,

@@ -1,4 +1,4 @@
-//! How the camera is turned, and the tanker should be.
+//! The mount of the camera and the expected attitude of the tanker, from the parameters.
 
 use super::table::Values;
 use crate::refuelling::{Angles, ExpectedAttitude};

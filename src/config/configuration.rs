@@ -1,4 +1,4 @@
-//! What the checked parameters mean together.
+//! The checked parameters as the types that the node uses.
 
 use nalgebra::Rotation3;
 
@@ -10,18 +10,18 @@ use crate::geometry::optical_from_body;
 use crate::refuelling::ExpectedAttitude;
 use crate::tracking::{CheckedFilterSettings, FilterSettings};
 
-/// Everything that the parameters say, in the types that the node works with.
+/// All parameters, in the types that the node uses.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "switches that are independent of each other"
 )]
 pub struct Configuration {
-    /// What the processing of a frame depends on.
+    /// Settings for the processing of a frame.
     pub settings: Settings,
     /// Name of a shipped marker map, or the path of one.
     pub marker_map: String,
-    /// Path of what the calibration may have wrong, in place of sigmas in the settings.
+    /// Path of a calibration error budget, used in place of the sigmas in the settings.
     pub calibration_budget_file: Option<String>,
     /// Child frame of the published transform.
     pub tanker_frame_id: String,
@@ -29,24 +29,24 @@ pub struct Configuration {
     pub publish_tf: bool,
     /// Whether time comes from /clock.
     pub use_sim_time: bool,
-    /// Whether others manage the node's state.
+    /// Whether the node is managed: a lifecycle node.
     pub lifecycle: bool,
-    /// Whether to publish what `RViz` and Foxglove can draw.
+    /// Whether to publish markers for `RViz` and Foxglove.
     pub publish_markers: bool,
-    /// Whether to tell detectors where markers will be.
+    /// Whether to publish predicted points for detectors.
     pub publish_predicted_points: bool,
-    /// Where detections come from.
+    /// The source of detections.
     pub input: Input,
     /// Most corrected bits of a tag.
     pub max_hamming: i32,
-    /// What refuelling and flight stacks are told.
+    /// Settings of the outputs for refuelling and flight stacks.
     pub consumers: ConsumerConfiguration,
-    /// How the camera is turned, and the tanker should be.
+    /// The mount of the camera and the expected attitude of the tanker.
     pub expected_attitude: ExpectedAttitude,
 }
 
 impl Configuration {
-    /// Returns whether estimates start from the nominal attitude, always or while there is no better.
+    /// Returns whether estimates start from the nominal attitude, always or until a better one is known.
     #[must_use]
     pub const fn starts_from_nominal(&self) -> bool {
         matches!(
@@ -57,7 +57,7 @@ impl Configuration {
 }
 
 impl From<&Parameters> for Configuration {
-    /// Returns the parameters' meaning; every checked set of values has one.
+    /// Converts the parameters; this cannot fail for checked values.
     fn from(parameters: &Parameters) -> Self {
         let values = Values::from(parameters);
         Self {
@@ -123,7 +123,7 @@ fn correlated_noise(values: &Values) -> Option<CorrelatedNoise> {
     let share = values.correlated_noise_share;
     (share > 0.0).then(|| {
         CorrelatedNoise::new(share, values.correlated_noise_time_s)
-            .expect("the table allows only shares and times that pass")
+            .expect("the ranges in the table are those of the check")
     })
 }
 
@@ -141,13 +141,13 @@ fn filter_settings(values: &Values) -> CheckedFilterSettings {
     };
     settings
         .checked()
-        .expect("the table allows only what the filter takes, which a test tries")
+        .expect("the ranges in the table are within those of the filter, as a test checks")
 }
 
-/// Returns the attitude that the tanker is expected to have in the camera.
+/// Returns the expected attitude of the tanker in the camera.
 ///
-/// `camera_from_tanker = optical_from_body · receiver_from_camera_bodyᵀ · receiver_from_tanker`:
-/// the angles turn bodies with x forward, y left, z up; the optical frame looks along that x.
+/// `camera_from_tanker = optical_from_body · receiver_from_camera_bodyᵀ · receiver_from_tanker`: the angles rotate
+/// bodies with x forward, y left, z up; the optical frame looks along that x.
 #[must_use]
 pub fn nominal_camera_from_tanker(
     receiver_from_tanker: &Rotation3<f64>,

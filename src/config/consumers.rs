@@ -1,4 +1,4 @@
-//! What refuelling and flight stacks are told, and what that needs.
+//! Settings of the outputs for refuelling and flight stacks, and their requirements.
 
 use nalgebra::{Matrix3, Rotation3};
 use ros2_node::parameters::Key;
@@ -7,7 +7,7 @@ use super::attitude::expected_attitude;
 use super::table::{KEYS, Values};
 use super::words::AttitudeSource;
 
-/// The optional outputs behind the pose, and what they need.
+/// The optional outputs and the settings that they need.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "a switch for each output")]
 pub struct ConsumerConfiguration {
@@ -15,9 +15,9 @@ pub struct ConsumerConfiguration {
     pub refuelling: Option<String>,
     /// Frame of the receptacle's messages.
     pub receiver_frame_id: String,
-    /// How the camera is turned: optical axes to the receiver's, FLU.
+    /// The mount of the camera: rotation from optical axes to the receiver's, FLU.
     pub receiver_from_camera: Rotation3<f64>,
-    /// The receptacle before the probe tip.
+    /// Whether to publish the receptacle relative to the probe tip.
     pub receptacle: bool,
     /// `px4_msgs/LandingTargetPose`.
     pub px4_landing_target: bool,
@@ -27,47 +27,47 @@ pub struct ConsumerConfiguration {
     pub mavros_landing_target: bool,
     /// `geometry_msgs/PoseStamped` for MAVROS.
     pub mavros_pose: bool,
-    /// Where the receiver's attitude comes from.
+    /// The source of the receiver's attitude.
     pub attitude: Option<AttitudeSource>,
-    /// Farthest that an attitude may be from the image, s.
+    /// Largest time difference between an attitude and the image, s.
     pub attitude_max_age_s: f64,
     /// Covariance of the attitude, rad².
     pub attitude_covariance: Matrix3<f64>,
     /// Covariance of the receiver's rate, (rad/s)².
     pub attitude_rate_covariance: Matrix3<f64>,
-    /// What PX4's clock shows more than ROS's, µs.
+    /// PX4's clock minus ROS's, µs.
     pub px4_minus_ros_us: i64,
-    /// Whether there is a track, which some outputs tell.
+    /// Whether there is a track; some outputs publish it.
     pub track: bool,
 }
 
-/// Why outputs cannot be as they are asked for.
+/// Why outputs cannot be switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// What an output needs is not given.
+    /// A parameter that an output needs is not set.
     #[error("{output} needs the parameter {needs:?}, which is \"none\"")]
     Missing {
-        /// The parameter that switches it on.
+        /// The parameter that switches the output on.
         output: &'static str,
         /// The parameter that is missing.
         needs: &'static str,
     },
-    /// An output comes from the track, and there is none.
+    /// The output needs the track, which is switched off.
     #[error("{output} comes from the track: the parameter \"track\" must be true with it")]
     NoTrack {
-        /// The parameter that switches it on.
+        /// The parameter that switches the output on.
         output: &'static str,
     },
-    /// Two outputs that one reader would take in turns.
+    /// Two outputs that the same reader would receive alternately.
     #[error(
         "{first} and {second} exclude each other: PX4 answers the second with a landing target of its own, \
          which would alternate with the first on one topic"
     )]
     TwoWriters {
-        /// The parameter that switches one on.
+        /// The parameter that switches the first one on.
         first: &'static str,
-        /// The parameter that switches the other on.
+        /// The parameter that switches the second one on.
         second: &'static str,
     },
 }
@@ -78,15 +78,15 @@ struct OutputSpec {
     name: &'static str,
     on: bool,
     needs_attitude: bool,
-    /// It tells the track, not single frames.
+    /// Whether it publishes the track rather than single frames.
     needs_track: bool,
 }
 
 impl ConsumerConfiguration {
-    /// Returns nothing when every output has what it needs.
+    /// Checks that every output has what it needs.
     ///
     /// # Errors
-    /// [`OutputError`] names the first that has not, or two that exclude each other.
+    /// [`OutputError`] names the first output that lacks something, or two that exclude each other.
     pub fn check(&self) -> Result<(), OutputError> {
         for output in self.outputs().into_iter().filter(|output| output.on) {
             let missing = |needs| OutputError::Missing {
@@ -106,8 +106,8 @@ impl ConsumerConfiguration {
             }
         }
         // PX4's vision_target_estimator publishes landing_target_pose from the marker report. With ours on the same
-        // uORB topic readers see both in turns, and precision landing's approach reads x_abs and y_abs of whatever
-        // comes, valid or not.
+        // uORB topic, readers receive both alternately, and the approach of precision landing reads x_abs and y_abs of
+        // each message, valid or not.
         if self.px4_landing_target && self.px4_fiducial_marker {
             return Err(OutputError::TwoWriters {
                 first: KEYS.publish_px4_landing_target.name(),

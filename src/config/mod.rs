@@ -1,8 +1,8 @@
-//! Raw parameters -> checked settings.
+//! From raw parameters to checked settings.
 //!
-//! `table` declares each parameter once; [`Parameters`] keeps values that were held against it; `configuration` makes of
-//! them what the floors below work with. Knows `estimation` and `tracking`; never a file, a topic or where a value came
-//! from.
+//! `table` declares each parameter once; [`Parameters`] holds values that passed the checks of the table;
+//! `configuration` converts them to the types of the layers below. Depends on `estimation` and `tracking`, and not on
+//! files, topics or the source of a value.
 
 mod attitude;
 mod configuration;
@@ -26,8 +26,8 @@ pub use words::{Attitude, AttitudeSource, Input};
 
 use table::Values;
 
-/// Checks values that are allowed one by one, but perhaps not together: what one output needs, another parameter may
-/// take away.
+/// Checks values against each other: each of them is allowed, but one output may need what another parameter switches
+/// off.
 ///
 /// # Errors
 /// [`TogetherError`] names the parameters.
@@ -51,15 +51,15 @@ pub fn check_together(parameters: &Parameters) -> Result<(), TogetherError> {
     Ok(ConsumerConfiguration::from(&values).check()?)
 }
 
-/// Why values that are allowed one by one are not so together.
+/// Why values that are allowed individually are not allowed together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TogetherError {
-    /// An output lacks what it needs.
+    /// An output lacks something that it needs.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// The calibration's errors stand in a file and in a parameter.
-    #[error("{file} and {sigma} both say what the calibration may have wrong: set one of them")]
+    /// Both a file and a parameter state the calibration's errors.
+    #[error("{file} and {sigma} both state errors of the calibration: set only one of them")]
     TwoCalibrations {
         /// The parameter that names the file.
         file: &'static str,

@@ -1,4 +1,4 @@
-//! The declarations as people read them: the shipped parameter file, and the tables of a page.
+//! The declarations as text: the shipped parameter file, and the tables of a page.
 
 use ros2_node::parameters;
 
@@ -10,13 +10,13 @@ const FILE_HEADER: &str = "\
 # Written by `tanker_pose parameters --yaml` from the declarations in src/config/table.rs.
 ";
 
-/// Returns what stands in `config/tanker_pose.yaml`.
+/// Returns the content of `config/tanker_pose.yaml`.
 #[must_use]
 pub fn parameter_file() -> String {
     FILE_HEADER.to_owned() + &parameters::parameter_file(SECTIONS)
 }
 
-/// Returns the tables that stand in `docs/parameters.md`.
+/// Returns the tables of `docs/parameters.md`.
 #[must_use]
 pub fn parameter_tables() -> String {
     parameters::markdown_tables(SECTIONS)

@@ -1,38 +1,38 @@
-//! What the processing of a frame depends on.
+//! Settings for the processing of a frame.
 
 use crate::estimation::{CorrelatedNoise, EstimatorSettings};
 use crate::tracking::CheckedFilterSettings;
 
-/// Everything a frame's processing depends on, checked.
+/// All settings for the processing of a frame, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// How a pose is found and judged.
+    /// Settings of the estimator.
     pub estimator: EstimatorSettings,
-    /// Standard deviation for detections that bring none, px.
+    /// Standard deviation of detections that do not state one, px.
     pub pixel_sigma_px: f64,
-    /// Detections nearer than this to the edge of the image are left out, px; 0: none.
+    /// Detections closer than this to the edge of the image are left out, px; 0: no margin.
     pub edge_margin_px: f64,
-    /// What the calibration may have wrong.
+    /// Standard deviations of the calibration's errors.
     pub calibration: CalibrationSigmas,
-    /// Sigmas of detections are multiplied by the factor by which residuals scatter more than they say.
+    /// Whether to multiply the sigmas of detections by the factor by which the scatter of residuals exceeds them.
     pub widen_by_sigma_factor: bool,
-    /// What part of the noise of detections lasts from frame to frame.
+    /// Noise of detections that is correlated from frame to frame.
     pub correlated_noise: Option<CorrelatedNoise>,
-    /// Pixels are those of the rectified image: P instead of K and D.
+    /// Whether pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
     /// Track settings; `None` disables tracking.
     pub track: Option<CheckedFilterSettings>,
 }
 
-/// Standard deviations of the calibration and of a shaking image; all 0: both are exact.
+/// Standard deviations of the calibration and of image jitter; 0: no error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CalibrationSigmas {
-    /// Of both focal lengths together, a share: 0.003 is 0.3 %.
+    /// Of both focal lengths together, relative: 0.003 is 0.3 %.
     pub focal_length: f64,
     /// Of each coordinate of the principal point, px.
     pub principal_point_px: f64,
     /// Of the coefficients of D, in the order of `sensor_msgs/CameraInfo`.
     pub distortion: [f64; 8],
-    /// Of a shift of the whole image, each frame another one, px.
+    /// Of a shift of the whole image, independent in each frame, px.
     pub jitter_px: f64,
 }

@@ -73,7 +73,7 @@ fn a_calibration_has_its_sigmas_from_a_file_or_from_parameters() {
         "k2_sigma",
     ] {
         let refused = set(sigma, ParameterValue::Double(0.01)).expect_err("both");
-        let words = format!("calibration_budget_file and {sigma} both say");
+        let words = format!("calibration_budget_file and {sigma} both state");
         assert!(refused.to_string().contains(&words), "{refused}");
         assert_eq!(set(sigma, ParameterValue::Double(0.0)), Ok(()));
     }

@@ -1,8 +1,8 @@
-//! The parameters that are one of a few words: each an enum, with the one list of its names, the default first.
+//! The parameters with a fixed set of values: each an enum with its names, the default first.
 
 use crate::estimation::{Initialisation, Refinement};
 
-/// Where the receiver's attitude comes from.
+/// Source of the receiver's attitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttitudeSource {
     /// `px4_msgs/VehicleAttitude`.
@@ -11,7 +11,7 @@ pub enum AttitudeSource {
     Imu,
 }
 
-/// Which messages bring the detections.
+/// Message type of the detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
     /// `tanker_pose/FeaturePointArray`.
@@ -40,7 +40,7 @@ ros2_node::words! { Refinement:
     "none" => Refinement::None,
 }
 
-/// Where the receiver's attitude comes from, if from anywhere.
+/// Source of the receiver's attitude; may be none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Attitude(pub Option<AttitudeSource>);
 

@@ -1,37 +1,36 @@
-//! The receiver's attitude at the time of an image, from samples that an autopilot sent around it.
+//! The receiver's attitude at the time of an image, interpolated between samples of an autopilot.
 
 use std::collections::VecDeque;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Samples kept: four seconds at 250 Hz, far more than any image is late.
+/// Number of samples kept: four seconds at 250 Hz, far more than the delay of any image.
 const KEPT: usize = 1000;
-/// rad/s; no aircraft turns faster, but an estimator that resets its heading does.
+/// rad/s; faster than any aircraft turns, but an estimator that resets its heading exceeds it.
 const FASTEST_RADPS: f64 = 10.0;
 
-/// s; images are answered a few tenths of a second late at most, so the newest attitude is little later than they
-/// are. One that is further ahead has a stamp of another clock, and the attitude between older samples would be
-/// that of another time.
+/// s; images are processed a few tenths of a second late at most, so the newest attitude is little later than they are.
+/// A sample further ahead has the stamp of another clock, and an attitude between older samples would be wrong.
 const FARTHEST_AHEAD_S: f64 = 1.0;
 
-/// What an autopilot said at one time.
+/// A sample of an autopilot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeSample {
-    /// When, ns.
+    /// Its time, ns.
     pub stamp_ns: i64,
-    /// Takes vectors in the body's axes to local ones.
+    /// Rotation from the body's axes to local ones.
     pub local_from_body: UnitQuaternion<f64>,
-    /// In the body's axes, rad/s, where it was measured: a gyro knows it better than the difference of two attitudes.
+    /// In the body's axes, rad/s, if it was measured: a gyro is more precise than the difference of two attitudes.
     pub rate_in_body: Option<Vector3<f64>>,
 }
 
-/// Attitude and rate of a body against local axes at one time.
+/// Attitude and rate of a body relative to local axes at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeAt {
-    /// Takes vectors in the body's axes to local ones.
+    /// Rotation from the body's axes to local ones.
     pub local_from_body: UnitQuaternion<f64>,
-    /// Against the local axes, in the body's axes, rad/s: between the rates of the two samples nearest in time, or,
-    /// where one of them brings none, the mean between their attitudes.
+    /// Relative to the local axes, in the body's axes, rad/s: interpolated between the rates of the two nearest
+    /// samples, or, if one of them has none, the mean rate between their attitudes.
     pub rate_in_body: Vector3<f64>,
 }
 
@@ -39,10 +38,10 @@ pub struct AttitudeAt {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttitudeError {
-    /// Fewer samples than a rate needs.
+    /// Too few samples for a rate.
     #[error("need 2 samples of the receiver's attitude, got {got}")]
     TooFew {
-        /// Samples since the start, or since they restarted.
+        /// Samples since the start or the last restart.
         got: usize,
     },
     /// The newest sample is too old for the image.
@@ -53,7 +52,7 @@ pub enum AttitudeError {
         /// s.
         limit_s: f64,
     },
-    /// The newest sample is so much later than the image that their clocks hardly agree.
+    /// The newest sample is so much later than the image that their clocks do not agree.
     #[error(
         "the newest attitude of the receiver is {by_s:.3} s later than the image, allowed is {limit_s} s: the clocks do not agree, or the image comes late"
     )]
@@ -63,13 +62,13 @@ pub enum AttitudeError {
         /// s.
         limit_s: f64,
     },
-    /// All samples are of later times.
+    /// All samples are later than the image.
     #[error("the first attitude of the receiver is {by_s:.3} s later than the image")]
     BeforeFirst {
         /// s.
         by_s: f64,
     },
-    /// The two samples around the image are far apart.
+    /// The two samples around the image are too far apart.
     #[error("{gap_s:.3} s between two attitudes of the receiver, allowed is {limit_s} s")]
     Gap {
         /// s.
@@ -77,7 +76,7 @@ pub enum AttitudeError {
         /// s.
         limit_s: f64,
     },
-    /// The two samples around the image say a rate that no aircraft has.
+    /// The two samples around the image imply a rate that no aircraft has.
     #[error(
         "the receiver's attitude turns at {rate_radps:.1} rad/s, allowed is {limit_radps} rad/s"
     )]
@@ -97,8 +96,8 @@ pub struct AttitudeHistory {
 }
 
 impl AttitudeHistory {
-    /// Returns an empty history. Two samples that are used together, and the newest sample and the image,
-    /// may be `limit_s` apart.
+    /// Returns an empty history. Two samples that are used together may be `limit_s` apart, and so may the newest
+    /// sample and the image.
     #[must_use]
     pub fn new(limit_s: f64) -> Self {
         Self {
@@ -107,8 +106,8 @@ impl AttitudeHistory {
         }
     }
 
-    /// Takes a sample. One that is not later than the last is left out; one that is more than a second
-    /// earlier restarts, since the source of the stamps has.
+    /// Adds a sample. A sample that is not later than the last one is ignored; one that is more than a second earlier
+    /// restarts the history, because the source of the stamps has restarted.
     pub fn push(&mut self, sample: AttitudeSample) {
         if let Some(last) = self.samples.back() {
             if seconds(last.stamp_ns, sample.stamp_ns) > 1.0 {
@@ -123,19 +122,19 @@ impl AttitudeHistory {
         self.samples.push_back(sample);
     }
 
-    /// Forgets all samples: the attitude has been corrected by a jump.
+    /// Removes all samples, because the attitude was corrected by a jump.
     pub fn clear(&mut self) {
         self.samples.clear();
     }
 
-    /// Returns the attitude at a stamp: between two samples, or a little after the last one at the rate of
-    /// the last two.
+    /// Returns the attitude at a stamp: interpolated between two samples, or extrapolated shortly after the last one
+    /// with the rate of the last two.
     ///
-    /// An error of the stamps that is smaller than the limits cannot be noticed here: it turns the attitude by as
-    /// much as the body turns in that time.
+    /// Errors of the stamps below the limits cannot be detected here: they rotate the attitude by as much as the body
+    /// rotates in that time.
     ///
     /// # Errors
-    /// [`AttitudeError`] says what is missing; nothing is ever taken from a sample further away.
+    /// [`AttitudeError`] gives the reason; no sample beyond the limits is ever used.
     pub fn at(&self, stamp_ns: i64) -> Result<AttitudeAt, AttitudeError> {
         let (got, limit_s) = (self.samples.len(), self.limit_s);
         let later = self
@@ -170,7 +169,7 @@ impl AttitudeHistory {
         let since_s = seconds(stamp_ns, from.stamp_ns);
         let mean = (from.local_from_body.inverse() * to.local_from_body).scaled_axis() / gap_s;
         let rate_in_body = match (from.rate_in_body, to.rate_in_body) {
-            // After the last sample that of the last one: a line through two noisy rates leads anywhere.
+            // After the last sample its own rate is used: extrapolating two noisy rates is unreliable.
             (Some(first), Some(then)) => first.lerp(&then, (since_s / gap_s).min(1.0)),
             _ => mean,
         };
@@ -189,7 +188,7 @@ impl AttitudeHistory {
     }
 }
 
-/// Returns `later − earlier`; stamps from anywhere cannot overflow it.
+/// Returns `later − earlier`; no two stamps overflow it.
 fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
     // Whole nanoseconds first: the difference of two doubles would lose them.
     (i128::from(later_ns) - i128::from(earlier_ns)) as f64 * 1e-9

@@ -33,7 +33,7 @@ pub fn ned_from_enu() -> Rotation3<f64> {
     ))
 }
 
-/// Returns a transform that turns the axes and keeps the origin.
+/// Returns a transform that rotates the axes and keeps the origin.
 #[must_use]
 pub fn rotation_only(b_from_a: &Rotation3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(

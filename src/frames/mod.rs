@@ -1,17 +1,17 @@
-//! Poses and motions in the frames, points and units that flight stacks ask for, covariance included.
+//! Poses and motions in the frames, points and units of flight stacks, covariance included.
 //!
-//! Knows `geometry` only. Everything is built from four changes, for [`PoseEstimate`] and for
-//! [`Motion`](crate::geometry::Motion) alike:
+//! Depends on `geometry` only. Everything is composed of four operations, for [`PoseEstimate`] and for
+//! [`Motion`](crate::geometry::Motion):
 //!
-//! | change | from | to | for example |
+//! | operation | from | to | for example |
 //! |---|---|---|---|
 //! | `seen_from(c_from_b)` | `b_from_a` | `c_from_a` | optical → FLU → FRD; from the camera to the probe tip |
 //! | `of(a_from_d)` | `b_from_a` | `b_from_d` | tanker's origin to its drogue; FLU → FRD of the tanker |
-//! | `inverse()` | `b_from_a` | `a_from_b` | the receiver as the tanker sees it |
+//! | `inverse()` | `b_from_a` | `a_from_b` | the receiver relative to the tanker |
 //! | `in_local_axes(attitude)` | `b_from_a` | axes of NED or ENU | PX4, MAVROS |
 //!
-//! The frames of the first two are rigid to each other and known exactly; the attitude of the fourth has
-//! a covariance of its own. Covariances are first order, as everywhere; a change of axes is exact.
+//! The frames of the first two are rigid to each other and known exactly; the attitude of the fourth has its own
+//! covariance. Covariances are of first order, as everywhere; a change of axes is exact.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Matrix6, Vector3};

@@ -1,4 +1,4 @@
-//! The four changes of a motion. Jacobians are of the error (δt, δθ, δv, δω) that `Motion` defines.
+//! The four operations on a motion. Jacobians are of the error (δt, δθ, δv, δω) that `Motion` defines.
 
 use nalgebra::{Isometry3, Matrix3, SMatrix};
 
@@ -7,7 +7,7 @@ use super::pose::{at_origin, inverse_jacobian};
 use crate::geometry::{Matrix12, Motion, congruent, set, skew};
 
 impl Motion {
-    /// Returns the motion as an observer in a frame `c` sees it that is fixed to `b`: `c_from_a`.
+    /// Returns the motion relative to a frame `c` that is fixed to `b`: `c_from_a`.
     #[must_use]
     pub fn seen_from(&self, c_from_b: &Isometry3<f64>) -> Self {
         let q = c_from_b.rotation.to_rotation_matrix();
@@ -23,8 +23,8 @@ impl Motion {
         }
     }
 
-    /// Returns the motion of a frame `d` that is fixed to `a`: `b_from_d`. A point on a lever arm has the
-    /// velocity of the origin and that of the turn.
+    /// Returns the motion of a frame `d` that is fixed to `a`: `b_from_d`. A point on a lever arm has the velocity of
+    /// the origin plus that of the rotation.
     #[must_use]
     pub fn of(&self, a_from_d: &Isometry3<f64>) -> Self {
         // v' = v + ω × R l, δ(R l) = δθ × R l.
@@ -42,7 +42,7 @@ impl Motion {
         }
     }
 
-    /// Returns the motion the other way round: `a_from_b`, as an observer fixed to `a` sees it.
+    /// Returns the inverse motion: `a_from_b`, for an observer fixed to `a`.
     #[must_use]
     pub fn inverse(&self) -> Self {
         // t' = −Rᵀ t, so v' = −Rᵀ (v − ω × t), ω' = −Rᵀ ω; and δ(Rᵀ x) = Rᵀ (δx + [x]× δθ).
@@ -71,11 +71,11 @@ impl Motion {
         }
     }
 
-    /// Returns the motion in local axes (NED or ENU) at the origin of `b`: the difference of the velocities
-    /// of both origins, and the rate of `a`, against the local axes.
+    /// Returns the motion in local axes (NED or ENU) at the origin of `b`: the difference of the velocities of both
+    /// origins, and the rate of `a`, relative to the local axes.
     ///
-    /// An observer fixed to `b` turns with it, so the rate of `b` comes in. Errors of motion, attitude and
-    /// rate are taken to be independent.
+    /// An observer fixed to `b` rotates with it, so the rate of `b` is needed. Errors of motion, attitude and rate are
+    /// assumed independent.
     #[must_use]
     pub fn in_local_axes(&self, attitude: &LocalAttitude) -> Self {
         let t = self.b_from_a.translation.vector;

@@ -1,4 +1,4 @@
-//! The four changes of a pose. Jacobians are of the error (δt, δθ) that `PoseCovariance` defines.
+//! The four operations on a pose. Jacobians are of the error (δt, δθ) that `PoseCovariance` defines.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
@@ -7,22 +7,21 @@ use crate::geometry::{PoseCovariance, congruent, set, skew};
 /// The pose of a frame `a` in a frame `b` with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseEstimate {
-    /// Where `a` is.
+    /// Pose of `a`.
     pub b_from_a: Isometry3<f64>,
     /// In the axes of `b`.
     pub covariance: PoseCovariance,
 }
 
-/// Attitude and rate of the frame `b` against local axes (NED or ENU), as an autopilot knows them at the
-/// time of the image.
+/// Attitude and rate of the frame `b` relative to local axes (NED or ENU), from an autopilot, at the time of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalAttitude {
-    /// Takes vectors in the axes of `b` to local ones: PX4's `VehicleAttitude.q` for `b` in FRD and NED,
-    /// the orientation of `sensor_msgs/Imu` for `b` in FLU and ENU.
+    /// Rotation from the axes of `b` to local ones: PX4's `VehicleAttitude.q` for `b` in FRD and NED, the orientation
+    /// of `sensor_msgs/Imu` for `b` in FLU and ENU.
     pub local_from_b: UnitQuaternion<f64>,
     /// Covariance of its error in local axes, `R = Exp(δα) R̂`, rad².
     pub covariance: Matrix3<f64>,
-    /// Rate of `b` against the local axes, in the axes of `b` as gyroscopes measure it, rad/s. Poses do not use it.
+    /// Rate of `b` relative to the local axes, in the axes of `b` as gyroscopes measure it, rad/s. Poses do not use it.
     pub rate_in_b: Vector3<f64>,
     /// Covariance of that rate, (rad/s)².
     pub rate_covariance: Matrix3<f64>,
@@ -42,7 +41,7 @@ impl PoseEstimate {
 
     /// Returns the pose of a frame `d` that is fixed to `a`: `b_from_d`.
     ///
-    /// With a lever arm between the two origins an error of attitude becomes one of position as well.
+    /// With a lever arm between the two origins, an error of attitude causes an error of position as well.
     #[must_use]
     pub fn of(&self, a_from_d: &Isometry3<f64>) -> Self {
         // t' = t + R l, and δ(R l) = δθ × R l.
@@ -55,7 +54,7 @@ impl PoseEstimate {
         }
     }
 
-    /// Returns the pose the other way round: `a_from_b`, its covariance in the axes of `a`.
+    /// Returns the inverse pose: `a_from_b`, its covariance in the axes of `a`.
     #[must_use]
     pub fn inverse(&self) -> Self {
         Self {
@@ -69,7 +68,7 @@ impl PoseEstimate {
 
     /// Returns the pose in local axes at the origin of `b`: relative position and attitude in NED or ENU.
     ///
-    /// The errors of pose and attitude are taken to be independent.
+    /// The errors of pose and attitude are assumed independent.
     #[must_use]
     pub fn in_local_axes(&self, attitude: &LocalAttitude) -> Self {
         let turned = self.seen_from(&at_origin(attitude));
@@ -102,7 +101,7 @@ pub(super) fn inverse_jacobian(b_from_a: &Isometry3<f64>) -> Matrix6<f64> {
     j
 }
 
-/// What an error `δα` of the axes does: `δt' = δα × t'`, `δθ' = δα`.
+/// Effect of an error `δα` of the axes: `δt' = δα × t'`, `δθ' = δα`.
 fn attitude_jacobian(position_in_local: &Vector3<f64>) -> nalgebra::Matrix6x3<f64> {
     let mut j = nalgebra::Matrix6x3::zeros();
     set(&mut j, 0, 0, &-skew(*position_in_local));

@@ -1,16 +1,16 @@
-//! ROS stamps (whole nanoseconds) and PX4 timestamps (unsigned microseconds).
+//! Conversion between ROS stamps (whole nanoseconds) and PX4 timestamps (unsigned microseconds).
 
-/// Why a time has no counterpart.
+/// Why a time cannot be converted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TimeError {
-    /// Before PX4's clock began, or its very beginning, which PX4 takes for "not set".
+    /// At or before the start of PX4's clock; PX4 interprets 0 as "not set".
     #[error("expected a stamp after the start of PX4's clock, got {px4_us} us on it")]
     BeforePx4Clock {
-        /// PX4's time that it would have, µs.
+        /// The converted time, µs.
         px4_us: i128,
     },
-    /// Beyond what 64 bits of nanoseconds hold.
+    /// Outside the range of 64 bits of nanoseconds.
     #[error("expected a time within 292 years of the epoch, got {ros_us} us")]
     BeyondRosTime {
         /// µs since the epoch of ROS time.
@@ -21,15 +21,15 @@ pub enum TimeError {
     NotSet,
 }
 
-/// Returns PX4's time of a ROS stamp, whole microseconds; what is below one is cut off.
+/// Returns PX4's time of a ROS stamp, whole microseconds, rounded towards the past.
 ///
-/// `px4_minus_ros_us` is what PX4's clock shows more than ROS's: 0 where the bridge translates the times
-/// (uXRCE-DDS with its time synchronisation), else a large negative number, since PX4 counts from its start.
+/// `px4_minus_ros_us` is PX4's clock minus ROS's: 0 if the bridge converts the times (uXRCE-DDS with its time
+/// synchronisation), otherwise a large negative number, since PX4 counts from its start.
 ///
 /// # Errors
 /// [`TimeError::BeforePx4Clock`] for a result of zero or below.
 pub fn px4_us_from_ros_ns(stamp_ns: i64, px4_minus_ros_us: i64) -> Result<u64, TimeError> {
-    // Towards the past on both sides of the epoch, so that order is kept.
+    // Euclidean division rounds towards the past on both sides of the epoch, so order is preserved.
     let px4_us = i128::from(stamp_ns.div_euclid(1000)) + i128::from(px4_minus_ros_us);
     match u64::try_from(px4_us) {
         Ok(us) if us > 0 => Ok(us),
@@ -40,7 +40,7 @@ pub fn px4_us_from_ros_ns(stamp_ns: i64, px4_minus_ros_us: i64) -> Result<u64, T
 /// Returns the ROS stamp of a PX4 time, ns.
 ///
 /// # Errors
-/// [`TimeError::NotSet`] for zero, [`TimeError::BeyondRosTime`] for times that nanoseconds cannot hold.
+/// [`TimeError::NotSet`] for zero, [`TimeError::BeyondRosTime`] for times outside the range of nanoseconds.
 pub fn ros_ns_from_px4_us(px4_us: u64, px4_minus_ros_us: i64) -> Result<i64, TimeError> {
     if px4_us == 0 {
         return Err(TimeError::NotSet);

@@ -1,14 +1,14 @@
 //! Variances and standard deviations, in the single precision of PX4's messages.
 
-/// A number that is no variance or standard deviation for a flight stack.
+/// A variance or standard deviation that a flight stack would reject.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "expected a finite positive number in single precision on axis {axis}, got {got:?}: flight stacks reject anything else"
 )]
 pub struct VarianceError {
-    /// Index of the number.
+    /// Index of the value.
     pub axis: usize,
-    /// The number, as it was given.
+    /// The value before conversion.
     pub got: f64,
 }
 
@@ -34,15 +34,15 @@ fn single<const N: usize>(
     Ok(result)
 }
 
-/// Returns variances as PX4 takes them where a field is a variance (`variance`, `cov_*`).
+/// Returns variances in single precision, for PX4's fields that are variances (`variance`, `cov_*`).
 ///
 /// # Errors
-/// [`VarianceError`] for what is not finite, not positive, or becomes so in single precision.
+/// [`VarianceError`] for values that are not finite or not positive, also after rounding to single precision.
 pub fn px4_variances<const N: usize>(variances: &[f64; N]) -> Result<[f32; N], VarianceError> {
     single(variances, |variance| variance)
 }
 
-/// Returns the standard deviations of these variances, as PX4 takes them where a field is one (`std_*`).
+/// Returns the standard deviations of these variances, for PX4's fields that are standard deviations (`std_*`).
 ///
 /// # Errors
 /// As [`px4_variances`].
@@ -52,10 +52,10 @@ pub fn px4_standard_deviations<const N: usize>(
     single(variances, f64::sqrt)
 }
 
-/// Returns the variances of standard deviations that came from a flight stack.
+/// Returns the variances from standard deviations of a flight stack.
 ///
 /// # Errors
-/// As [`px4_variances`]; the number told is the standard deviation.
+/// As [`px4_variances`]; the reported value is the standard deviation.
 pub fn variances_from<const N: usize>(
     standard_deviations: &[f32; N],
 ) -> Result<[f64; N], VarianceError> {

@@ -1,4 +1,4 @@
-//! The one home of what a pose error is and in which order its covariance stands.
+//! Definition of the pose error and of the order of its covariance.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Rotation3, SMatrix, Vector6};
 
@@ -6,22 +6,21 @@ use super::rotation::skew;
 
 /// Covariance of a pose `b_from_a`, in ROS's convention (`geometry_msgs/PoseWithCovariance`).
 ///
-/// Order (x, y, z, rotX, rotY, rotZ), in m and rad, along and about the fixed axes of frame `b`,
-/// the message's `header.frame_id`. The error it describes stands on the left and keeps position and
-/// attitude apart: `t = t̂ + δt`, `R = Exp(δθ) R̂`, see [`pose_error`]. It is therefore not the
-/// covariance of an se(3) twist, and turning it into other axes is `blockdiag(Q, Q) Σ blockdiag(Q, Q)ᵀ`,
-/// which is what tf2 and MAVROS do.
+/// Order (x, y, z, rotX, rotY, rotZ), in m and rad, along and about the fixed axes of frame `b`, the message's
+/// `header.frame_id`. The error is on the left, with position and attitude separate: `t = t̂ + δt`, `R = Exp(δθ) R̂`,
+/// see [`pose_error`]. It is therefore not the covariance of an se(3) twist, and converting it to other axes is
+/// `blockdiag(Q, Q) Σ blockdiag(Q, Q)ᵀ`, as in tf2 and MAVROS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseCovariance(pub Matrix6<f64>);
 
 impl PoseCovariance {
-    /// Returns the 36 numbers row by row, as ROS messages carry them.
+    /// Returns the 36 numbers row by row, as in ROS messages.
     #[must_use]
     pub fn row_major(&self) -> [f64; 36] {
         std::array::from_fn(|i| self.0[(i / 6, i % 6)])
     }
 
-    /// Returns the covariance of the same pose error with its vectors expressed in axes turned by `rotation`.
+    /// Returns the covariance of the same pose error with its vectors expressed in axes rotated by `rotation`.
     #[must_use]
     pub fn rotated(&self, rotation: &Rotation3<f64>) -> Self {
         let mut q = Matrix6::zeros();
@@ -30,8 +29,8 @@ impl PoseCovariance {
         Self(congruent(&q, &self.0))
     }
 
-    /// Returns `eᵀ Σ⁻¹ e`, the squared Mahalanobis distance of a pose error (NEES when the error is
-    /// against the truth); `None` when the covariance is not positive definite.
+    /// Returns `eᵀ Σ⁻¹ e`, the squared Mahalanobis distance of a pose error (NEES if the error is against the truth);
+    /// `None` if the covariance is not positive definite.
     #[must_use]
     pub fn mahalanobis_squared(&self, error: &Vector6<f64>) -> Option<f64> {
         self.0
@@ -54,8 +53,8 @@ impl PoseCovariance {
             && self.0.cholesky().is_some()
     }
 
-    /// Returns the covariance of `(δt, δθ)` from that of `(δθ, δc)`, where `c = t + lever` is the
-    /// position in frame `b` of a point that turns with `a`, and `lever` leads from `a`'s origin to it.
+    /// Returns the covariance of `(δt, δθ)` from that of `(δθ, δc)`, where `c = t + lever` is the position in frame `b`
+    /// of a point fixed to `a`, and `lever` goes from `a`'s origin to it.
     pub(crate) fn from_point(
         rotation_then_point: &Matrix6<f64>,
         lever: &nalgebra::Vector3<f64>,
@@ -84,7 +83,7 @@ impl PoseCovariance {
         for row in 0..3 {
             for column in 0..3 {
                 covariance[(row, column)] = position[(row.min(column), row.max(column))];
-                // One triangle for both: what comes in may be symmetric but for rounding.
+                // One triangle is used for both, because the input may be symmetric only up to rounding.
                 covariance[(3 + row, 3 + column)] = turn[(row.min(column), row.max(column))];
                 covariance[(row, 3 + column)] = mixed[(row, column)];
                 covariance[(3 + column, row)] = mixed[(row, column)];
@@ -115,8 +114,9 @@ pub fn congruent<const M: usize, const N: usize>(
     (full + full.transpose()) * 0.5
 }
 
-/// Returns the symmetric `S` with `S S` a covariance, which may be singular; what is below zero by rounding counts as
-/// zero. Unlike a triangular root it is continuous, so its columns mean the same from frame to frame.
+/// Returns the symmetric `S` such that `S S` is a covariance, which may be singular; eigenvalues that are negative by
+/// rounding count as zero. Unlike a triangular root it is continuous, so its columns keep their meaning from frame to
+/// frame.
 pub(crate) fn principal_root(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     let eigen = covariance.symmetric_eigen();
     let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());

@@ -1,8 +1,8 @@
-//! Rotations, poses and covariances: the ground floor.
+//! Rotations, poses and covariances.
 //!
-//! Knows `nalgebra` only. A transform is `b_from_a`: it takes coordinates in `a` to coordinates in
-//! `b`, and neighbours cancel, `c_from_b * b_from_a`. What a pose error is, and in which order its
-//! covariance belongs, is defined once, in [`PoseCovariance`].
+//! Depends on `nalgebra` only. A transform is `b_from_a`: it converts coordinates in `a` to coordinates in `b`, and
+//! neighbours cancel, `c_from_b * b_from_a`. The pose error and the order of its covariance are defined in
+//! [`PoseCovariance`].
 
 mod covariance;
 mod motion;

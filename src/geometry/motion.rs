@@ -1,4 +1,4 @@
-//! How one frame moves against another: pose, velocity and rate, and the covariance of all three.
+//! Relative motion of two frames: pose, velocity and rate, and the covariance of all three.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector3};
 
@@ -12,16 +12,16 @@ pub type Vector12 = SVector<f64, 12>;
 
 /// The moving pose of a frame `a` in a frame `b`, all vectors in the axes of `b`.
 ///
-/// Both rates are those that an observer fixed to `b` sees: `velocity_in_b` is the derivative of the
-/// coordinates `t` of `a`'s origin, and `Ṙ = [rate_in_b]× R`. When `b` itself turns, this is not the
-/// difference of two inertial velocities.
+/// Both rates are those that an observer fixed to `b` measures: `velocity_in_b` is the derivative of the coordinates
+/// `t` of `a`'s origin, and `Ṙ = [rate_in_b]× R`. If `b` itself rotates, this is not the difference of two inertial
+/// velocities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Where `a` is.
+    /// Pose of `a`.
     pub b_from_a: Isometry3<f64>,
     /// Velocity of `a`'s origin, m/s.
     pub velocity_in_b: Vector3<f64>,
-    /// Rate of turn of `a`, rad/s.
+    /// Angular rate of `a`, rad/s.
     pub rate_in_b: Vector3<f64>,
     /// Covariance of the error (δt, δθ, δv, δω), SI and radians, in the axes of `b`. The first six are
     /// those of [`PoseCovariance`]; `v = v̂ + δv` and `ω = ω̂ + δω`.
@@ -47,10 +47,10 @@ impl Motion {
         PoseCovariance(self.covariance.fixed_view::<6, 6>(0, 0).into_owned())
     }
 
-    /// Returns velocity and rate (of `a` as seen from `b`) in the axes of `a`: what
-    /// `nav_msgs/Odometry` requires, whose twist is in `child_frame_id`.
+    /// Returns velocity and rate (of `a` relative to `b`) in the axes of `a`, as `nav_msgs/Odometry` requires, whose
+    /// twist is in `child_frame_id`.
     ///
-    /// Turning into axes that are themselves uncertain adds the attitude's error to the covariance.
+    /// Since these axes are uncertain, the attitude's error adds to the covariance.
     #[must_use]
     pub fn twist_in_a(&self) -> Twist {
         // u = Rᵀ v with R = Exp(δθ) R̂ gives δu = R̂ᵀ (δv + [v]× δθ), and the same for the rate.
@@ -72,7 +72,7 @@ impl Motion {
         }
     }
 
-    /// Returns `eᵀ Σ⁻¹ e` for an error by [`motion_error`]; `None` when the covariance is not positive definite.
+    /// Returns `eᵀ Σ⁻¹ e` for an error by [`motion_error`]; `None` if the covariance is not positive definite.
     #[must_use]
     pub fn mahalanobis_squared(&self, error: &Vector12) -> Option<f64> {
         self.covariance
@@ -114,7 +114,7 @@ pub fn motion_error(truth: &Motion, found: &Motion) -> Vector12 {
     error
 }
 
-/// Puts a 3×3 block where it belongs in a Jacobian.
+/// Copies a 3×3 block into a Jacobian.
 pub(crate) fn set<const M: usize, const N: usize>(
     matrix: &mut SMatrix<f64, M, N>,
     row: usize,

@@ -1,4 +1,4 @@
-//! Rotations: small ones from a vector, the nearest one to a matrix, the fixed one of the camera.
+//! Rotations: from a small vector, nearest to a matrix, and the fixed one of the camera.
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3, Vector4};
 
@@ -15,7 +15,8 @@ pub fn axial(m: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12)
 }
 
-/// Returns the chord between two rotations, rad for small ones; unlike the angle it resolves less than 1e-8.
+/// Returns the chord between two rotations, which is the angle in rad for small ones; unlike the angle it resolves
+/// values below 1e-8.
 #[must_use]
 pub fn chord(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
     (to.matrix() - from.matrix()).norm() / std::f64::consts::SQRT_2
@@ -23,7 +24,7 @@ pub fn chord(from: &Rotation3<f64>, to: &Rotation3<f64>) -> f64 {
 
 /// Returns the rotation `cay(w) = (I − [w]×/2)⁻¹ (I + [w]×/2)`, which is `Exp(w)` to second order.
 ///
-/// It needs no sine, and is a rotation to machine precision for every finite `w` (radians).
+/// Without trigonometric functions; orthogonal to machine precision for every finite `w` (radians).
 #[inline(always)]
 #[must_use]
 pub fn cayley(w: Vector3<f64>) -> Rotation3<f64> {
@@ -46,7 +47,7 @@ pub fn cayley(w: Vector3<f64>) -> Rotation3<f64> {
     ))
 }
 
-/// rad; below it the series of the rotation's Jacobians are exact to machine precision.
+/// rad; below it the series of the Jacobians are exact to machine precision.
 const SMALL_ANGLE: f64 = 1e-3;
 
 /// Returns the left Jacobian `J` of the rotation vector `w` (radians): `Exp(w + δ) = Exp(J δ) Exp(w)`
@@ -73,7 +74,7 @@ pub fn left_jacobian(w: Vector3<f64>) -> Matrix3<f64> {
 /// Returns the inverse of [`left_jacobian`], for less than a full turn.
 ///
 /// # Source
-/// The same, Eq. (146).
+/// As [`left_jacobian`], Eq. (146).
 #[must_use]
 pub fn left_jacobian_inverse(w: Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
@@ -125,16 +126,16 @@ pub fn nearest_rotation_by_svd(m: &Matrix3<f64>) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(u * s * v_t)
 }
 
-/// Newton steps after which the eigenvalue is taken as it is; five are usual.
+/// Limit of Newton steps for the eigenvalue; five are usual.
 const MAX_EIGENVALUE_STEPS: usize = 30;
-/// Below this share of the largest possible adjugate the eigenvector is not well fixed, and the SVD decides.
+/// Below this share of the largest possible adjugate the eigenvector is poorly determined, and the SVD is used.
 const MIN_ADJUGATE_SHARE: f64 = 1e-6;
 
 /// Returns the rotation `R` that maximises `tr(Rᵀ m)`, without an SVD.
 ///
-/// The quaternion of `R` is the eigenvector of Horn's symmetric 4×4 matrix with the largest
-/// eigenvalue; Newton's method on the characteristic polynomial finds that eigenvalue from above,
-/// and the adjugate gives the vector. Where the eigenvalue is nearly double the SVD takes over.
+/// The quaternion of `R` is the eigenvector of Horn's symmetric 4×4 matrix for the largest eigenvalue. Newton's method
+/// on the characteristic polynomial finds that eigenvalue from above, and the adjugate gives the vector. If the
+/// eigenvalue is nearly double, the SVD is used.
 ///
 /// # Source
 /// Horn, *JOSA A* 4(4), 1987; the Newton step as in Theobald, *Acta Cryst.* A61, 2005.
@@ -148,7 +149,7 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Rotation3<f64> {
     let lambda = largest_eigenvalue(&horn);
     let q = null_vector(&(horn - Matrix4::identity() * lambda));
     let norm = q.norm();
-    // Cofactors are products of three numbers of size one here, so the norm needs no scaling.
+    // Cofactors are products of three numbers of order one here, so the norm needs no scaling.
     if norm < MIN_ADJUGATE_SHARE {
         return nearest_rotation_by_svd(m);
     }
@@ -179,7 +180,7 @@ fn largest_eigenvalue(n: &Matrix4<f64>) -> f64 {
     let c2 = -0.5 * p2;
     let c1 = -p3 / 3.0;
     let c0 = 0.125 * p2 * p2 - 0.25 * n2.dot(&n2);
-    // No root of a traceless symmetric 4×4 lies above this, so Newton descends to the largest.
+    // No root of a traceless symmetric 4×4 matrix exceeds this, so Newton's method descends to the largest.
     let mut lambda = (0.75 * p2).sqrt();
     for _ in 0..MAX_EIGENVALUE_STEPS {
         let value = ((lambda * lambda + c2) * lambda + c1) * lambda + c0;
@@ -196,7 +197,7 @@ fn largest_eigenvalue(n: &Matrix4<f64>) -> f64 {
     lambda
 }
 
-/// The longest row of the adjugate of a singular symmetric matrix, which spans its null space.
+/// Returns the longest row of the adjugate of a singular symmetric matrix, which spans its null space.
 fn null_vector(m: &Matrix4<f64>) -> Vector4<f64> {
     let mut best = Vector4::zeros();
     for row in 0..4 {

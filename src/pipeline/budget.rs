@@ -1,4 +1,4 @@
-//! What map and settings say of their own errors -> the estimator's budget.
+//! The estimator's error budget, from what map and settings state.
 
 use crate::camera::{
     CalibrationBudget, CalibrationChange, Camera, CameraError, CameraInfo, FIRST_COEFFICIENT,
@@ -8,7 +8,7 @@ use crate::estimation::{CalibrationMode, ErrorBudget, FlexMode};
 use crate::target::MapBudget;
 use crate::text::{digits, quoted};
 
-/// Returns the budget of a checked map, checked settings and a calibration's own file.
+/// Returns the budget from a checked map, checked settings and a calibration's own error file.
 #[must_use]
 pub fn error_budget(
     map: &MapBudget,
@@ -33,7 +33,7 @@ pub fn error_budget(
     )
 }
 
-/// Returns what a calibration's own file says, for a camera that was read from `info`.
+/// Returns the modes of a calibration's own error file, for a camera made from `info`.
 ///
 /// # Errors
 /// As [`CalibrationBudget::changes`].
@@ -48,7 +48,7 @@ pub fn modes_of_file(
         .collect())
 }
 
-/// Returns what map, settings and a calibration's own file state of their own errors, for people.
+/// Returns the stated errors of map, settings and a calibration's own file as a log line.
 #[must_use]
 pub fn budget_in_words(
     map: &MapBudget,
@@ -94,7 +94,8 @@ pub fn budget_in_words(
     )
 }
 
-/// One mode for both focal lengths, for each coordinate of the principal point, and for each coefficient of D.
+/// One mode for both focal lengths together, one for each coordinate of the principal point, and one for each
+/// coefficient of D.
 fn calibration_modes(sigmas: &CalibrationSigmas) -> Vec<CalibrationMode> {
     let mode = |name: &str, places: &[usize], sigma: f64| {
         let mut change = CalibrationChange::zeros();

@@ -1,4 +1,4 @@
-//! Checks of the input, before anything is computed from it.
+//! Checks of the input before any computation.
 
 use nalgebra::Point3;
 
@@ -8,7 +8,7 @@ use crate::camera::{Camera, Pixel};
 use crate::estimation::Observation;
 use crate::text::MAX_NAME_BYTES;
 
-/// px; limit of pixels where the size of the image is not known.
+/// px; limit of pixels if the image size is unknown.
 const MAX_PIXEL: f64 = 1e5;
 
 pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
@@ -19,7 +19,7 @@ pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Checked first: even a refusal echoes the header.
+/// Checked first, because a refusal echoes the header too.
 pub(super) fn check_frame_id_length(got: &str) -> Result<(), Refusal> {
     if got.len() <= MAX_NAME_BYTES {
         return Ok(());
@@ -43,12 +43,12 @@ pub(super) fn check_frame_id(expected: &str, got: &str) -> Result<(), Refusal> {
 ///
 /// # Inputs
 /// * `default_sigma_px`: for detections with sigma 0.
-/// * `marker_in_tanker`: where a marker sits, m; `None` for an id that is not on the tanker.
+/// * `marker_in_tanker`: returns the position of a marker, m; `None` for an unknown id.
 ///
 /// # Errors
-/// [`Refusal`] on the first fault: pixel not finite, sigma out of range, id unknown, id twice, pixel
-/// far outside the image. One bad detection refuses the frame, because a detector that makes one
-/// such mistake is not to be believed on the others.
+/// [`Refusal`] for the first error: pixel not finite, sigma out of range, unknown id, duplicate id, pixel far outside
+/// the image. One invalid detection refuses the frame, because the others of that detector are then not reliable
+/// either.
 pub fn observe(
     camera: &Camera,
     detections: &[Detection],
@@ -97,8 +97,8 @@ fn check_numbers(seen: &Detection) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// A centroid may lie a little outside the image, but not farther than the image is wide: such a
-/// pixel is garbage, or belongs to a `camera_info` of another resolution.
+/// A centroid may be slightly outside the image. A pixel that is outside by more than the image's width or height is
+/// garbage, or belongs to a `camera_info` of another resolution.
 fn check_in_image(camera: &Camera, seen: &Detection) -> Result<(), Refusal> {
     let size = camera.image_size_px();
     let within = |value: f64, length: Option<u32>| {

@@ -1,6 +1,6 @@
-//! The constants of `tanker_pose/msg/EstimatorStatus`, for everything that counts or prints outcomes.
+//! The constants of `tanker_pose/msg/EstimatorStatus`, for counters and output.
 
-/// Declares an enum of constants: variant, number on the wire and name in one place.
+/// Declares an enum of constants: variant, number on the wire and name.
 macro_rules! status_codes {
     (
         $(#[$of_enum:meta])*
@@ -15,7 +15,7 @@ macro_rules! status_codes {
         }
 
         impl $code {
-            /// Every code, in the order of its number.
+            /// Every code, in numerical order.
             pub const ALL: [Self; [$($number),+].len()] = [$(Self::$variant),+];
 
             /// Returns the number on the wire.
@@ -24,7 +24,7 @@ macro_rules! status_codes {
                 self as u8
             }
 
-            /// Returns the constant's name, without a prefix that all constants of this enum share.
+            /// Returns the constant's name, without the prefix that the constants of this enum share.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -40,7 +40,7 @@ status_codes! {
     OutcomeCode
     /// A pose was published.
     Ok = 0 "OK",
-    /// No `CameraInfo` has arrived yet.
+    /// No `CameraInfo` has been received yet.
     NoCameraInfo = 1 "NO_CAMERA_INFO",
     /// The latest `CameraInfo` cannot be used.
     InvalidCameraInfo = 2 "INVALID_CAMERA_INFO",
@@ -48,7 +48,7 @@ status_codes! {
     FrameMismatch = 3 "FRAME_MISMATCH",
     /// The stamp is zero or malformed.
     ZeroStamp = 4 "ZERO_STAMP",
-    /// An id that the marker map does not have.
+    /// An id that is not on the marker map.
     UnknownId = 5 "UNKNOWN_ID",
     /// Two detections with the same id.
     DuplicateId = 6 "DUPLICATE_ID",
@@ -64,18 +64,18 @@ status_codes! {
     DegenerateGeometry = 11 "DEGENERATE_GEOMETRY",
     /// The solver found no minimum.
     NoConvergence = 12 "NO_CONVERGENCE",
-    /// The best fit puts a marker behind the camera.
+    /// The best fit has a marker behind the camera.
     BehindCamera = 13 "BEHIND_CAMERA",
-    /// The residuals are too large for the given sigmas.
+    /// The residuals are too large for the stated sigmas.
     NotTrusted = 14 "NOT_TRUSTED",
     /// A second pose fits almost as well.
     Ambiguous = 15 "AMBIGUOUS",
 }
 
 status_codes! {
-    /// What a frame did to the track: the constants `TRACK_…`.
+    /// The effect of a frame on the track: the constants `TRACK_…`.
     TrackCode
-    /// There is no track, or the frame is not for it.
+    /// There is no track, or the frame does not apply to it.
     None = 0 "NONE",
     /// Too few poses so far to confirm a track.
     Candidate = 1 "CANDIDATE",
@@ -85,7 +85,7 @@ status_codes! {
     Predicted = 3 "PREDICTED",
     /// The pose contradicts the track and was not used.
     Gated = 4 "GATED",
-    /// The stamp is that of an earlier frame or too old, or a late frame had nothing to use.
+    /// The stamp is that of an earlier frame or too old, or a late frame had no usable pose.
     OutOfOrder = 5 "OUT_OF_ORDER",
     /// The frame came late and was used at its own time.
     Inserted = 6 "INSERTED",

@@ -1,9 +1,9 @@
-//! Detections at the edge of the image: a beacon that the edge cuts has its centroid moved inwards.
+//! Detections at the edge of the image: if the edge cuts a beacon, its centroid is shifted inwards.
 //!
-//! A disc is cut when its centre is nearer to the edge than its radius, and the centroid of what is left is always
-//! nearer to the edge than that radius: a margin as wide as the largest beacon's radius leaves out every cut one. A
-//! pixel farther outside than the margin is no cut beacon, for no blob has its centroid there: it comes from points
-//! that were computed (simulated, undistorted, or the corners of a tag), and is judged like any other.
+//! A disc is cut if its centre is closer to the edge than its radius, and the centroid of the visible part is always
+//! closer to the edge than that radius. So a margin as wide as the largest beacon's radius excludes every cut beacon. A
+//! pixel that is outside by more than the margin is not a cut beacon, because no blob has its centroid there. Such a
+//! pixel was computed (simulated, undistorted, or the corner of a tag), and is processed like any other.
 
 use std::fmt;
 
@@ -16,14 +16,14 @@ use crate::text::list;
 /// Largest deviation of `R Rᵀ` from the identity: calibrations are printed with six digits.
 const ROTATION_TOLERANCE: f64 = 1e-4;
 
-/// Where the image ends that detections come from.
+/// The edges of the image that detections come from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageEdges {
     size_px: Option<(u32, u32)>,
     raw: Option<RawImage>,
 }
 
-/// The raw image that a rectified one was made of: beyond its edge the rectified one is black.
+/// The raw image from which a rectified one was made; outside its edge the rectified one is black.
 #[derive(Debug, Clone, PartialEq)]
 struct RawImage {
     rectified: Camera,
@@ -32,7 +32,7 @@ struct RawImage {
     raw_from_rectified: Matrix3<f64>,
 }
 
-/// Detections that were left out because the edge of the image may have cut their beacons.
+/// Detections left out because the edge of the image may have cut their beacons.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LeftOut {
     /// Their marker ids, in the order of the detections.
@@ -56,9 +56,9 @@ impl ImageEdges {
     /// Returns the edges of the image that a camera's detections come from.
     ///
     /// # Inputs
-    /// * `camera`: made of `info`, with the same `rectified`. Region of interest and binning count: what is not read
-    ///   out cuts as well. Without a size of the image there is no edge.
-    /// * `rectified`: then the raw image's edge counts, too, where `K`, `D` and `R` say where it lies.
+    /// * `camera`: made from `info`, with the same `rectified`. The edges are those after region of interest and
+    ///   binning, since a region cuts beacons as well. Without a size of the image there is no edge.
+    /// * `rectified`: if so, the raw image's edge counts too, provided that `K`, `D` and `R` are known.
     #[must_use]
     pub fn new(info: &CameraInfo, camera: &Camera, rectified: bool) -> Self {
         Self {
@@ -71,10 +71,10 @@ impl ImageEdges {
         }
     }
 
-    /// Returns the observations that are clear of the edges, and which ones are not.
+    /// Returns the observations that are clear of the edges, and the ids of the others.
     ///
     /// # Inputs
-    /// * `margin_px`: least distance from an edge, inside or outside; 0: all are clear.
+    /// * `margin_px`: least distance from an edge, inside or outside; 0: no margin.
     #[must_use]
     pub fn leave_out(
         &self,
@@ -107,7 +107,7 @@ impl ImageEdges {
 }
 
 impl RawImage {
-    /// Returns `None` where the camera info does not say how the rectified image was made.
+    /// Returns `None` if the camera info does not state how the rectified image was made.
     fn new(info: &CameraInfo, rectified: &Camera) -> Option<Self> {
         let camera = Camera::from_info(info, false).ok()?;
         let rectified_from_raw = Matrix3::from_row_slice(&info.r);
@@ -120,8 +120,8 @@ impl RawImage {
         })
     }
 
-    /// Returns the distance of a rectified pixel's place in the raw image from that image's nearest edge; `None` where
-    /// it has no such place.
+    /// Returns the distance of a rectified pixel from the nearest edge of the raw image, px of that image; `None` if
+    /// the pixel has no counterpart there.
     fn distance_px(&self, rectified: Pixel) -> Option<f64> {
         let ray = self.rectified.ray_from_pixel(rectified).ok()?;
         let in_raw = self.raw_from_rectified * Vector3::new(ray.x, ray.y, 1.0);
@@ -137,10 +137,10 @@ impl RawImage {
     }
 }
 
-/// Returns the distance of a pixel from the border of an image, px. The border runs along the outer sides of the
-/// outermost pixels, whose centres are whole numbers.
+/// Returns the distance of a pixel from the border of an image, px. The border is the outer side of the outermost
+/// pixels, whose centres are integers.
 fn to_border(pixel: Pixel, (width, height): (u32, u32)) -> f64 {
-    // How far beyond the nearer of two opposite sides; negative between them.
+    // Distance beyond the nearer of two opposite sides; negative between them.
     let beyond = |value: f64, length: u32| (-0.5 - value).max(value - (f64::from(length) - 0.5));
     let (u, v) = (beyond(pixel.u, width), beyond(pixel.v, height));
     if u <= 0.0 && v <= 0.0 {

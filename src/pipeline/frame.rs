@@ -2,20 +2,20 @@
 
 use super::{Refusal, Stamp};
 
-/// One beacon found in an image, before any check.
+/// A detected beacon in an image, unchecked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Marker id in the tanker's marker map.
+    /// Marker id on the tanker's marker map.
     pub id: u32,
     /// Column of the centre, px; the centre of the top-left pixel is (0, 0).
     pub u_px: f64,
     /// Row of the centre, px.
     pub v_px: f64,
-    /// Standard deviation of column and of row, px; 0 where the detector does not know it.
+    /// Standard deviation of column and of row, px; 0 if the detector does not state it.
     pub sigma_px: f64,
 }
 
-/// All detections of one image, before any check.
+/// All detections of one image, unchecked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DetectionFrame {
     /// When the image was taken.

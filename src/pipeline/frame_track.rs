@@ -1,17 +1,17 @@
-//! What one frame did to the track, and its code on the wire.
+//! The effect of one frame on the track, and its code on the wire.
 
 use super::TrackCode;
 use crate::geometry::Motion;
 use crate::tracking::TrackOutcome;
 
-/// What one frame did to the track.
+/// The effect of one frame on the track.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameTrack {
-    /// What became of the frame in the filter; `None` without a filter, or when the frame is not of this camera or
-    /// has no time.
+    /// The filter's outcome for the frame; `None` without a filter, or if the frame is not of this camera or has no
+    /// valid stamp.
     pub outcome: Option<TrackOutcome>,
-    /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; `None`
-    /// without a confirmed track, or when the frame came late.
+    /// The motion of the tanker in the camera at the frame's stamp, corrected by the frame or predicted; `None` without
+    /// a confirmed track, or if the frame came late.
     pub motion: Option<Motion>,
 }
 

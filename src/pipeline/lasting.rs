@@ -1,4 +1,4 @@
-//! The causes of one frame -> what the track takes of it: noise of its own, and errors that other frames share.
+//! Divides the error of a frame's pose for the track: independent noise, and errors shared with other frames.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -6,12 +6,13 @@ use crate::estimation::{CauseKind, FrameCauses, Solution};
 use crate::geometry::{PoseCovariance, principal_root};
 use crate::tracking::LastingError;
 
-/// The error of one frame's pose, in parts.
+/// The error of one frame's pose, divided into parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameErrors {
-    /// Covariance of what is this frame's own: noise and jitter.
+    /// Covariance of the part that is independent from frame to frame: noise and jitter.
     pub noise: PoseCovariance,
-    /// What lasts: first the causes that change with time, then the constant ones, the largest in position first.
+    /// The shared errors: first the causes that change with time, then the constant ones, the largest in position
+    /// first.
     pub lasting: Vec<LastingError>,
 }
 
@@ -22,16 +23,16 @@ const ATTITUDE: u64 = 3 << 40;
 const NOISE: u64 = 4 << 40;
 const UNDIVIDED: u64 = 5 << 40;
 const WIDENING: u64 = 6 << 40;
-/// Of the variance of any direction; what the causes explain is linearised elsewhere than the covariance, and differs by
-/// a percent of it.
+/// Least widening that is taken into account, relative to the variance in any direction. The causes are linearised at
+/// another point than the covariance, so their sum differs from it by about a percent.
 const LEAST_WIDENING: f64 = 0.05;
 
 impl FrameErrors {
-    /// Returns the parts of the error of a frame's pose. A cause has the same number in all frames of one budget.
+    /// Returns the parts of the error of a frame's pose. A cause has the same number in all frames with one budget.
     ///
     /// # Inputs
-    /// * `causes`: what each cause did in the frame, where that is known.
-    /// * `has_causes`: whether any are stated; if not, the whole error is noise.
+    /// * `causes`: the effect of each cause in the frame, if known.
+    /// * `has_causes`: whether a budget is stated; if not, the whole error is noise.
     #[must_use]
     pub fn new(solution: &Solution, causes: Option<&FrameCauses>, has_causes: bool) -> Self {
         match causes {
@@ -44,7 +45,7 @@ impl FrameErrors {
         }
     }
 
-    /// Returns parts that claim too little rather than too much: all of the error may last, and all of it may be new.
+    /// Returns a conservative division: all of the error may be shared, and all of it may be independent.
     fn undivided(covariance: &PoseCovariance) -> Self {
         let root = principal_root(&covariance.0);
         Self {
@@ -77,13 +78,13 @@ impl FrameErrors {
         for (axis, shift) in (0..).zip(causes.attitude_shifts.iter().flatten()) {
             lasting.push(constant(ATTITUDE + axis, shift));
         }
-        // Modes are in every frame and in one order, while a frame may have no marker with a survey error.
+        // All frames have the same modes in the same order, but a frame may lack markers with a survey error.
         let mut mode = MODE;
         for cause in &causes.causes {
             if let CauseKind::Noise | CauseKind::Jitter = cause.kind {
                 noise += cause.covariance.0;
             }
-            // Survey, prior and noise that lasts are in by their shifts.
+            // Survey, prior and correlated noise are already included by their shifts.
             let Some(shift) = &cause.shift else {
                 continue;
             };
@@ -98,14 +99,14 @@ impl FrameErrors {
                 _ => {}
             }
         }
-        // Where the covariance is widened beyond what the causes explain, nobody knows how long that lasts.
+        // If the covariance is widened beyond what the causes explain, the time constant of that part is unknown.
         let explained: Matrix6<f64> = causes.causes.iter().map(|cause| cause.covariance.0).sum();
         if let Some(root) = widening(&whole.0, &explained) {
             let beyond = root * root.transpose();
             noise += (beyond + beyond.transpose()) * 0.5;
             lasting.extend(columns(WIDENING, &root));
         }
-        // Where there is no room for all, constant ones can be carried together.
+        // If there is not enough room, constant causes can be combined.
         let rank = |error: &LastingError| {
             let size_m = error.shift.fixed_rows::<3>(0).norm();
             (error.time_constant_s.is_none(), -size_m)
@@ -121,7 +122,7 @@ impl FrameErrors {
     }
 }
 
-/// Returns a root of what a covariance has beyond the part that is explained; `None` where that is all of it.
+/// Returns a root of the part of a covariance that is not explained; `None` if all of it is.
 fn widening(whole: &Matrix6<f64>, explained: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let l = whole.cholesky()?.l();
     let inverse = l.try_inverse()?;

@@ -1,12 +1,13 @@
-//! For which image a prediction is needed: the one whose camera info has arrived, or else the next one by the period.
+//! The stamp of the image for which a prediction is needed: the one whose camera info has arrived, or the next one by
+//! the period.
 
 use super::Stamp;
 use super::checks::check_stamp;
 
-/// ns; frames farther apart have no period that would tell the next one.
+/// ns; frames that are farther apart do not determine a period.
 const MAX_PERIOD_NS: i64 = 1_000_000_000;
 
-/// The stamps so far. It reads no clock: a stamp comes with a camera info or with detections.
+/// The latest stamps. No clock is read: a stamp comes with a camera info or with detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NextImage {
     info: Option<Stamp>,
@@ -14,16 +15,16 @@ pub struct NextImage {
 }
 
 impl NextImage {
-    /// Takes the stamp of a camera info; returns it as that of the image that it came with. None where it is no
-    /// time, or that of the last one, as from a driver that tells its calibration repeatedly.
+    /// Takes the stamp of a camera info and returns it as that of its image. `None` if it is not valid, or is the last
+    /// one again, as from a driver that repeats its calibration.
     pub fn on_camera_info(&mut self, stamp: Stamp) -> Option<Stamp> {
         check_stamp(stamp).ok()?;
         let is_new = self.info.replace(stamp) != Some(stamp);
         is_new.then_some(stamp)
     }
 
-    /// Takes the stamp of a frame of detections; returns that of the image after it, one period later. None where
-    /// camera infos come with the images, or the period is not known.
+    /// Takes the stamp of a frame of detections and returns that of the next image, one period later. `None` if camera
+    /// infos come with the images, or the period is unknown.
     pub fn on_detections(&mut self, stamp: Stamp) -> Option<Stamp> {
         check_stamp(stamp).ok()?;
         let last = self.frame.replace(stamp)?;

@@ -1,4 +1,4 @@
-//! What becomes of a frame: a trusted pose, or the one reason for none.
+//! The outcome of a frame: a trusted pose, or the reason for a refusal.
 
 use super::residuals::{MarkerResidual, residuals};
 use super::{FrameTrack, LeftOut, OutcomeCode, Refusal};
@@ -7,33 +7,33 @@ use crate::estimation::{
     EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, Solution,
 };
 
-/// What became of one frame.
+/// The outcome of one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameOutcome {
-    /// The trusted pose, or the one reason for none.
+    /// The trusted pose, or the reason for a refusal.
     pub result: Result<Solution, Refusal>,
-    /// The solution behind a refusal that was judged on its numbers: for the status, never to be flown.
+    /// The solution that was refused because of its numbers; for the status, not for guidance.
     pub doubtful: Option<Solution>,
-    /// How the detections lie about the best fit, trusted or not, those left out as wrong too; empty without a fit.
+    /// Residuals of all detections at the best fit, trusted or not, including excluded ones; empty without a fit.
     pub residuals: Vec<MarkerResidual>,
-    /// Marker ids that the solution rests on.
+    /// Ids of the markers used in the solution.
     pub used_ids: Vec<u32>,
-    /// Marker ids left out, as wrong or at the edge of the image.
+    /// Ids of the markers not used: excluded as wrong, or at the edge of the image.
     pub rejected_ids: Vec<u32>,
-    /// Those at the edge of the image, of which the solver knew nothing.
+    /// Those at the edge of the image, which the solver did not receive.
     pub left_out: LeftOut,
-    /// Where the iteration started; `None` when no solve was attempted.
+    /// The initialisation; `None` if no solve was attempted.
     pub initialisation: Option<Initialisation>,
-    /// What the frame did to the track, if there is one.
+    /// The effect of the frame on the track.
     pub track: FrameTrack,
-    /// What each cause of the error budget did in this frame; `None` without a budget or a solution.
+    /// The effect of each cause of the error budget in this frame; `None` without a budget or a solution.
     pub causes: Option<FrameCauses>,
-    /// What the stated sigmas were multiplied by; 1 where they were taken as they are.
+    /// The factor by which the stated sigmas were multiplied; 1 if they were not.
     pub widened_by: f64,
 }
 
 impl FrameOutcome {
-    /// Returns the outcome of a frame that gave no solution.
+    /// Returns the outcome of a frame without a solution.
     #[must_use]
     pub fn refused(refusal: Refusal) -> Self {
         Self {
@@ -80,7 +80,7 @@ impl FrameOutcome {
         }
     }
 
-    /// Returns the outcome with its pose refused, if it has one.
+    /// Returns the outcome with its pose, if any, refused.
     pub(super) fn refused_for(mut self, refusal: Refusal) -> Self {
         if let Ok(solution) = self.result {
             self.doubtful = Some(solution);
@@ -89,7 +89,7 @@ impl FrameOutcome {
         self
     }
 
-    /// Returns the outcome with the detections that were left out before it.
+    /// Returns the outcome with the detections that were left out before the solver.
     #[must_use]
     pub fn without(mut self, left_out: LeftOut) -> Self {
         self.rejected_ids.extend(&left_out.ids);
@@ -97,8 +97,8 @@ impl FrameOutcome {
         self
     }
 
-    /// Returns what there is to say of the frame: the refusal, what was left out at the edge of the image, and that its
-    /// sigmas were widened; often nothing.
+    /// Returns the message about the frame: the refusal, detections left out at the edge of the image, and widened
+    /// sigmas; usually empty.
     #[must_use]
     pub fn message(&self) -> String {
         let refusal = self.result.as_ref().err().map(ToString::to_string);
@@ -121,7 +121,7 @@ impl FrameOutcome {
             .map_or(OutcomeCode::Ok, Refusal::code)
     }
 
-    /// Returns whether stamp and `frame_id` are those of an image of a camera that is known and can be used.
+    /// Returns whether stamp and `frame_id` belong to an image of a known, usable camera.
     #[must_use]
     pub fn header_fits(&self) -> bool {
         !self.result.as_ref().is_err_and(Refusal::is_of_header)
@@ -134,7 +134,7 @@ impl FrameOutcome {
     }
 }
 
-/// degrees; within it the true error follows the covariance, beyond it the projection bends too much.
+/// degrees; up to this the true error follows the covariance, beyond it the projection is too nonlinear.
 const MAX_ATTITUDE_SIGMA_DEG: f64 = 10.0;
 
 fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
@@ -151,7 +151,7 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
         let reason = "from this view they leave a direction of the pose free";
         return Some(EstimateError::Degenerate { reason }.into());
     }
-    // Before the uncertainty, which is what a second pose next to the first makes of the covariance.
+    // Before the uncertainty, because a large covariance can be the consequence of a second pose near the first.
     let limit = settings.max_ambiguity;
     let has_rival = solution.ambiguity > 0.0 && solution.ambiguity >= limit;
     if has_rival && limit < 1.0 {

@@ -1,13 +1,12 @@
-//! Where the markers will be in an image, for detectors: as long as the prediction is worth anything, and with a
-//! sigma that says how much.
+//! Predicted positions of the markers in an image, for detectors, with sigmas, for as long as the prediction is useful.
 //!
 //! ```text
-//! last motion of the track -> carried on to the stamp -> held against the nominal attitude -> projected
+//! last motion of the track -> propagated to the stamp -> combined with the nominal attitude -> projected
 //! ```
 //!
-//! A track gives no odometry beyond `max_gap_s`, because it is not safe to fly by. A detector that looks for beacons
-//! where they are expected needs less: where to look, and how far around. So the last motion is kept beyond the end
-//! of its track. What first becomes unknown is the attitude; then the nominal one takes its place, at the last range.
+//! Odometry ends `max_gap_s` after the last frame, because it is no longer safe to fly by. A detector needs less: where
+//! to search for beacons, and in how large a window. So the last motion is kept beyond the end of its track. The
+//! attitude becomes uncertain first; it is then replaced by the nominal one, at the last range.
 
 use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Rotation3};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -20,29 +19,29 @@ use crate::geometry::{Motion, PoseCovariance, congruent, left_jacobian_inverse, 
 use crate::target::Marker;
 use crate::tracking::{Filter, FilterSettings, LastMotion};
 
-/// Of the shorter side of the image: a marker whose sigma is larger may be anywhere in it, since a window of four
-/// sigmas to each side is then as large as the image.
+/// Relative to the shorter side of the image: with a larger sigma, a window of four sigmas to each side covers the
+/// image.
 const MAX_SIGMA_SHARE: f64 = 1.0 / 8.0;
-/// px; the same where the size of the image is not known.
+/// px; the same limit if the size of the image is unknown.
 const MAX_SIGMA_PX: f64 = 64.0;
-/// Windows of this many sigmas that do not reach into the image are not worth a look.
+/// Windows of this many sigmas must reach into the image.
 const WINDOW_SIGMAS: f64 = 4.0;
-/// A marker nearer than this many sigmas of its depth has no pixel that a linear law describes.
+/// A marker closer than this many sigmas of its depth has no pixel that a linearisation describes.
 const LEAST_DEPTH_SIGMAS: f64 = 4.0;
 
-/// Where one marker is expected in an image.
+/// The predicted position of one marker in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedPoint {
     /// Marker id.
     pub id: u32,
-    /// Expected pixel, in the image that detections come from; it may lie outside.
+    /// Predicted pixel, in the image that detections come from; it may be outside.
     pub pixel: Pixel,
-    /// Covariance of a detection's column and row about it, px²: that of the motion and the detection's own.
+    /// Covariance of a detection's column and row about it, px²: that of the motion plus the detection's noise.
     pub covariance: Matrix2<f64>,
 }
 
 impl PredictedPoint {
-    /// Returns the standard deviation in the direction in which it is largest, px.
+    /// Returns the largest standard deviation in any direction, px.
     #[must_use]
     pub fn sigma_px(&self) -> f64 {
         self.covariance
@@ -52,7 +51,7 @@ impl PredictedPoint {
             .sqrt()
     }
 
-    /// Returns it in the form of a detection, with the largest sigma for both axes.
+    /// Returns the point as a detection, with the largest sigma for both axes.
     #[must_use]
     pub fn detection(&self) -> Detection {
         Detection {
@@ -64,12 +63,12 @@ impl PredictedPoint {
     }
 }
 
-/// What is remembered beyond the end of a track.
+/// The motions kept beyond the end of a track.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Predictor {
     /// Of the latest track or candidate.
     latest: Option<LastMotion>,
-    /// Of the latest track: a candidate knows no velocity, so it is soon worth less.
+    /// Of the latest track; the velocity of a candidate is unknown, so its prediction degrades sooner.
     confirmed: Option<LastMotion>,
 }
 
@@ -78,7 +77,7 @@ impl Predictor {
         *self = Self::default();
     }
 
-    /// Takes what a frame has taught the tracker.
+    /// Updates the motions after a frame.
     pub(super) fn follow(&mut self, stamp: Stamp, outcome: &FrameOutcome, tracker: &Tracker) {
         let Ok(solution) = &outcome.result else {
             return;
@@ -91,7 +90,7 @@ impl Predictor {
         }
     }
 
-    /// Returns where the markers are expected in the image of a stamp; empty where that is unknown.
+    /// Returns the predicted points for the image of a stamp; empty without a usable prediction.
     pub(super) fn points(
         &self,
         stamp: Stamp,
@@ -104,7 +103,7 @@ impl Predictor {
             .unwrap_or_default()
     }
 
-    /// Returns the poses that may be expected at a stamp, the likely best first.
+    /// Returns the possible poses at a stamp, the most accurate first.
     fn poses(
         &self,
         stamp: Stamp,
@@ -118,7 +117,7 @@ impl Predictor {
     }
 }
 
-/// What is looked at, with what.
+/// The camera and markers for a prediction.
 pub(super) struct View<'a> {
     pub(super) camera: &'a Camera,
     pub(super) markers: &'a [Marker],
@@ -127,7 +126,7 @@ pub(super) struct View<'a> {
 }
 
 impl View<'_> {
-    /// Returns where the markers are expected from a pose, without those that are not worth a look.
+    /// Returns the predicted points for a pose, without those outside the image or too uncertain.
     fn points(
         &self,
         camera_from_tanker: &Isometry3<f64>,
@@ -153,7 +152,7 @@ impl View<'_> {
     }
 }
 
-/// Without a track, the pose of a frame with the velocity and the noise that a track would begin with.
+/// Without a track: the pose of a frame, with the initial velocity and noise of a track.
 fn of_pose_alone(stamp: Stamp, solution: &Solution) -> Option<LastMotion> {
     let mut filter = Filter::new(FilterSettings::default()).ok()?;
     filter.update(
@@ -164,11 +163,11 @@ fn of_pose_alone(stamp: Stamp, solution: &Solution) -> Option<LastMotion> {
     filter.last_motion()
 }
 
-/// Returns a predicted pose held against the nominal attitude, and its covariance.
+/// Returns a predicted pose combined with the nominal attitude, and its covariance.
 ///
-/// The nominal attitude counts as a measurement of 5° on each axis, and of as much more as the attitude was off when
-/// it was last seen: a tanker that flies off its nominal attitude, or a wrong mount, stays so. While the track
-/// knows the attitude better, this changes next to nothing.
+/// The nominal attitude is used as a measurement with 5° on each axis, plus the deviation when the attitude was last
+/// observed: a tanker that is not aligned, or a wrong mount, remains so. While the track's attitude is more precise,
+/// this has almost no effect.
 fn with_nominal_attitude(
     predicted: &Motion,
     last: &Motion,
@@ -186,7 +185,7 @@ fn with_nominal_attitude(
     let covariance = predicted.pose_covariance();
     let variance = PRIOR_SIGMA.powi(2) + turn_to_nominal(last).norm_squared();
     let turn = turn_to_nominal(predicted);
-    // The nominal attitude's own error turns with the attitude between the two.
+    // The error of the nominal attitude is rotated by the attitude between the two.
     let seen = left_jacobian_inverse(turn);
     let noise = seen * seen.transpose() * variance;
     let by_attitude = covariance.0.fixed_columns::<3>(3).into_owned();
@@ -206,8 +205,8 @@ fn with_nominal_attitude(
     (pose, PoseCovariance((left + left.transpose()) * 0.5))
 }
 
-/// Returns the pixel of a marker and the covariance of a detection about it; `None` where it has none, or may be
-/// behind the camera.
+/// Returns the pixel of a marker and the covariance of a detection about it; `None` if it has no pixel or may be behind
+/// the camera.
 fn project(
     camera: &Camera,
     camera_from_tanker: &Isometry3<f64>,

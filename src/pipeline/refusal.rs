@@ -1,26 +1,26 @@
-//! The reasons for which a frame gives no pose.
+//! The reasons for refusing a frame.
 
 use super::{OutcomeCode, Stamp, SuspectMarker};
 use crate::camera::CameraError;
 use crate::estimation::EstimateError;
 use crate::text::{clip, digits, list, quoted};
 
-/// px; a detector that claims more than a thousandth of a pixel has filled in the wrong field.
+/// px; a smaller sigma means that the wrong field was filled in.
 pub(super) const MIN_SIGMA_PX: f64 = 1e-3;
 /// px; beyond this a detection carries no information.
 pub(super) const MAX_SIGMA_PX: f64 = 1e3;
 
-/// Why a frame gives no pose. Each names the expected and the received value.
+/// Why a frame has no pose. The messages state the expected and the received value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// No camera info yet.
-    #[error("expected a camera_info before the first detections, none has arrived yet")]
+    /// No camera info has been received.
+    #[error("expected a camera_info before the first detections, none has been received yet")]
     NoCameraInfo,
     /// The latest camera info cannot be used.
     #[error("the latest camera_info cannot be used: {0}")]
     InvalidCameraInfo(CameraError),
-    /// The detections belong to another camera frame, or do not say to which.
+    /// The detections belong to another camera frame, or do not name one.
     #[error("expected detections in the frame of camera_info, '{}', got frame_id '{}'{}", clip(expected), clip(got), if .expected.is_empty() || .got.is_empty() { " (an empty frame_id names no frame)" } else { "" })]
     FrameMismatch {
         /// `frame_id` of the camera info.
@@ -28,7 +28,7 @@ pub enum Refusal {
         /// `frame_id` of the detections.
         got: String,
     },
-    /// A `frame_id` that would have to be echoed bit for bit, and is too long for that.
+    /// The `frame_id`, which is echoed unchanged, is too long.
     #[error("expected a frame_id of {limit} bytes at most, got '{}'", clip(got), limit = crate::text::MAX_NAME_BYTES)]
     FrameIdTooLong {
         /// `frame_id` of the detections.
@@ -37,24 +37,24 @@ pub enum Refusal {
     /// The time of the image is missing or malformed.
     #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
     InvalidStamp(Stamp),
-    /// An id that is not on the tanker.
+    /// An id that is not on the marker map.
     #[error("expected ids of the marker map, got unknown id {}", list(ids))]
     UnknownId {
-        /// All such ids of the frame.
+        /// All unknown ids of the frame.
         ids: Vec<u32>,
     },
-    /// A detection of another message type that does not name one marker.
+    /// A detection of another message type that does not identify one marker.
     #[error("expected {expected}, got {got}")]
     InvalidId {
-        /// What would do.
+        /// The expected value.
         expected: &'static str,
         /// The received value.
         got: String,
     },
-    /// Tags that are not on the tanker.
+    /// Tags that are not on the marker map.
     #[error("expected tags of the marker map, got unknown tag {}", list(ids))]
     UnknownTag {
-        /// All such ids of the frame.
+        /// All unknown ids of the frame.
         ids: Vec<i32>,
     },
     /// A tag of another family.
@@ -71,7 +71,7 @@ pub enum Refusal {
         /// Its family in the detection.
         got: String,
     },
-    /// A detection whose own header is not that of its array.
+    /// A detection whose header differs from that of its array.
     #[error("expected detections of one image, got id {id} from frame_id '{}' at {} s {} ns", clip(frame_id), .stamp.sec, .stamp.nanosec)]
     OtherImage {
         /// Marker id.
@@ -81,15 +81,15 @@ pub enum Refusal {
         /// `frame_id` of the detection.
         frame_id: String,
     },
-    /// One marker seen twice.
+    /// A marker that is detected more than once.
     #[error("expected each id once, got id {id} {count} times")]
     DuplicateId {
         /// The first such id.
         id: u32,
-        /// How often.
+        /// Number of its detections.
         count: usize,
     },
-    /// A pixel that is not a number.
+    /// A pixel that is NaN or infinite.
     #[error("expected finite pixels, got ({u_px:?}, {v_px:?}) for id {id}")]
     NotFinite {
         /// Marker id.
@@ -99,15 +99,15 @@ pub enum Refusal {
         /// Row.
         v_px: f64,
     },
-    /// A sigma that cannot be one.
-    #[error("expected sigma between {least} and {most} px, or 0 for not known, got {sigma_px:?} for id {id}", least = MIN_SIGMA_PX, most = MAX_SIGMA_PX)]
+    /// A sigma out of range.
+    #[error("expected sigma between {least} and {most} px, or 0 for unknown, got {sigma_px:?} for id {id}", least = MIN_SIGMA_PX, most = MAX_SIGMA_PX)]
     InvalidSigma {
         /// Marker id.
         id: u32,
         /// The sigma, px.
         sigma_px: f64,
     },
-    /// A pixel where the image does not reach.
+    /// A pixel far outside the image.
     #[error("id {id}: {reason}")]
     OutsideImage {
         /// Marker id.
@@ -120,7 +120,7 @@ pub enum Refusal {
     Estimate(#[from] EstimateError),
     /// The attitude is so uncertain that no covariance describes it.
     #[error(
-        "expected an attitude known to {limit_deg}° or better (1 sigma), got {sigma_deg:.1}°: beyond that a covariance is not honest"
+        "expected an attitude known to {limit_deg}° or better (1 sigma), got {sigma_deg:.1}°: beyond that no covariance describes the error"
     )]
     TooUncertain {
         /// Largest standard deviation of the attitude, degrees.
@@ -146,7 +146,7 @@ pub enum Refusal {
         /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
         unclear: Vec<u32>,
     },
-    /// The frame shows a marker that is left out too often for wrong detections.
+    /// The frame shows a marker that is excluded too often for occasional wrong detections.
     #[error("expected markers to be left out only occasionally, but {0}")]
     SuspectMarker(SuspectMarker),
     /// A second pose fits nearly as well.
@@ -154,9 +154,9 @@ pub enum Refusal {
         "expected one pose to stand out, but another is {ambiguity:.3} times as likely (max_ambiguity {limit})"
     )]
     Ambiguous {
-        /// Likelihood of the rival over that of the best.
+        /// Likelihood of the rival relative to the best.
         ambiguity: f64,
-        /// The largest to accept.
+        /// The largest that is accepted.
         limit: f64,
     },
 }
@@ -186,7 +186,7 @@ impl Refusal {
             Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
         }
     }
-    /// Returns whether it concerns the header, or a missing camera for it.
+    /// Returns whether it concerns the header, or a missing camera.
     #[must_use]
     pub fn is_of_header(&self) -> bool {
         matches!(
@@ -200,7 +200,7 @@ impl Refusal {
     }
 }
 
-/// The code of an estimate that failed.
+/// Returns the code of an estimator error.
 const fn code_of(error: &EstimateError) -> OutcomeCode {
     match error {
         EstimateError::TooFewPoints { .. } | EstimateError::TooFewPrecisePoints { .. } => {
@@ -213,7 +213,7 @@ const fn code_of(error: &EstimateError) -> OutcomeCode {
     }
 }
 
-/// What may be wrong around an estimator that failed.
+/// Returns possible reasons for an estimator error.
 const fn hint(error: &EstimateError) -> &'static str {
     match error {
         EstimateError::BehindCamera { .. } => {

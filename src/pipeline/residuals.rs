@@ -1,22 +1,22 @@
-//! How the detections of a frame lie about its best fit, to explain why it is not trusted.
+//! Residuals of a frame's detections at its best fit, which explain why it is not trusted.
 
 use nalgebra::Vector2;
 
 use crate::camera::Camera;
 use crate::estimation::{Observation, Solution};
 
-/// One detection against a fit.
+/// The residual of one detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarkerResidual {
     /// Marker id.
     pub id: u32,
-    /// Predicted minus seen pixel, px.
+    /// Predicted minus detected pixel, px.
     pub residual_px: Vector2<f64>,
-    /// Standard deviation that the fit took for the detection, px.
+    /// Standard deviation used in the fit, px.
     pub sigma_px: f64,
 }
 
-/// Returns the residuals of observations about a fit, without those that the fit puts where the camera sees nothing.
+/// Returns the residuals of observations at a fit, without markers that have no pixel there.
 pub(super) fn residuals(
     solution: &Solution,
     camera: &Camera,

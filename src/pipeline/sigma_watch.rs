@@ -1,31 +1,31 @@
-//! How large the residuals of the last seconds are against the sigmas that were stated.
+//! Ratio of the residuals of the last seconds to the stated sigmas.
 //!
-//! The median counts, so that a few gross errors among many fits say nothing. A frame of which points were left out
-//! counts with the fit of all its points: of those that remain chi-squared is small because they remain.
+//! The median is used, so that a few gross errors among many fits have no effect. A frame with exclusions counts with
+//! the fit of all its points, because the chi-squared of the remaining ones is small by selection.
 
 use super::Stamp;
 use super::window::{WINDOW_S, Window};
 use crate::estimation::Solution;
 
-/// Fits that make an estimate: 10 Hz. The factor is then known to 4 % (1 sigma) with six points.
+/// Number of fits for an estimate: 10 Hz. With six points the factor is then known to 4 % (1 sigma).
 pub(super) const ENOUGH: usize = 100;
 
-/// By what factor stated sigmas are too small (above 1) or too large (below 1).
+/// The factor by which stated sigmas are too small (above 1) or too large (below 1).
 ///
-/// What is wrong the same way in every frame (map, calibration) makes residuals larger too, and a solution's covariance
-/// knows of neither. Nothing is widened by it: see [`super::Pipeline::widened_by`].
+/// Errors that are the same in every frame (map, calibration) increase residuals as well, and the covariance does not
+/// contain them. This factor does not widen anything: see [`super::Pipeline::widened_by`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SigmaFactor {
-    /// What the sigmas would have to be multiplied by.
+    /// The factor by which the sigmas would have to be multiplied.
     pub factor: f64,
-    /// How many fits it rests on.
+    /// Number of fits that it is based on.
     pub fits: usize,
     /// From the first of them to the last, s.
     pub span_s: f64,
 }
 
 impl SigmaFactor {
-    /// Returns whether it rests on ten seconds at ten fits a second or more.
+    /// Returns whether it is based on ten seconds with at least ten fits a second.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.fits >= ENOUGH && self.span_s >= WINDOW_S
@@ -37,10 +37,10 @@ impl SigmaFactor {
 pub(super) struct SigmaWatch(Window);
 
 impl SigmaWatch {
-    /// Takes a fit, trusted or not.
+    /// Adds a fit, trusted or not.
     ///
     /// # Inputs
-    /// * `widened_by`: what the stated sigmas were multiplied by for it.
+    /// * `widened_by`: the factor by which the stated sigmas were multiplied for it.
     pub(super) fn take(&mut self, stamp: Stamp, solution: &Solution, widened_by: f64) {
         let (chi_squared, degrees_of_freedom) = solution.of_all_points();
         if degrees_of_freedom > 0 {

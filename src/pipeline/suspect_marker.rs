@@ -1,15 +1,16 @@
-//! The message about a marker that is left out in many frames.
+//! The message about a marker that is excluded in many frames.
 
 use std::fmt;
 
-/// A marker that is left out too often to be a wrong detection. Its `Display` explains the causes.
+/// A marker that is excluded too often for occasional wrong detections. Its `Display` explains the causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SuspectMarker {
     /// Marker id.
     pub id: u32,
-    /// Of the last frames that show it, those that leave it out, 0 to 1; where it may be this or another, a half.
+    /// Share of the last frames showing it in which it was excluded, 0 to 1; a frame in which it is unclear which of
+    /// two is wrong counts half.
     pub share: f64,
-    /// Since when, s.
+    /// Duration, s.
     pub lasted_s: f64,
 }
 

@@ -1,32 +1,32 @@
-//! Markers that are left out in many frames: not a wrong detection now and then, but a wrong place in the map, an
-//! airframe that bends, a wrong calibration, or a detector that takes something else for them.
+//! Markers that are excluded in many frames. The cause is not an occasional wrong detection, but a wrong position on
+//! the map, a bending airframe, a wrong calibration, or a detector that confuses something else with the marker.
 //!
-//! The cause is unknown, and with all but the last the other markers are wrong too. So while that lasts no pose of a frame
-//! that shows such a marker is trusted, whether it rests on the marker or not.
+//! The cause is unknown, and with all but the last one the other markers are wrong too. So while it lasts, no pose of a
+//! frame that shows such a marker is trusted, whether or not the marker is used.
 
 use super::{FrameOutcome, Refusal, Stamp, SuspectMarker};
 use crate::estimation::Solution;
 
 /// s; time constant of the sums.
 const MEMORY_S: f64 = 3.0;
-/// s; longest step by which anything fades: where nothing is seen nothing is mended.
+/// s; longest step of the decay: without observations nothing is resolved.
 const MAX_FADE_S: f64 = 1.0;
-/// Of the frames that show the marker: from this share on it is no accident.
+/// A marker becomes suspect from this share on, of the frames that show it.
 const MANY_OF_ALL: f64 = 0.3;
-/// A share below this says that it was one.
+/// Below this share a run ends.
 const NOT_MANY: f64 = 0.2;
-/// Share below which it is over.
+/// Below this share a suspicion ends.
 const FEW_OF_ALL: f64 = 0.1;
-/// s; how long it must be left out so often.
+/// s; least duration of a run.
 const LASTING_S: f64 = 3.0;
-/// In how many frames at least.
+/// Least number of exclusions.
 const MANY: f64 = 10.0;
-/// Where one of two markers is wrong, and it is not clear which.
+/// Weight of a frame in which either of two markers may be wrong.
 const EITHER: f64 = 0.5;
-/// A share of frames that is as good as none: what was left out once is forgotten.
+/// Below this share a marker is removed from the list.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// What is known of a marker that was left out not long ago.
+/// The recent exclusions of a marker.
 #[derive(Debug)]
 struct Record {
     id: u32,
@@ -37,7 +37,7 @@ struct Record {
     is_suspect: bool,
 }
 
-/// A time in which a marker is left out often.
+/// A time in which a marker is often excluded.
 #[derive(Debug)]
 struct Run {
     since_s: f64,
@@ -71,7 +71,7 @@ impl Record {
         if let Some(run) = &mut self.run {
             run.left_out += left_out;
             let lasts = run.left_out >= MANY && now_s - run.since_s >= LASTING_S;
-            // Not by what is left of a glint that is over.
+            // Only in a frame that excludes it: the decaying sum of a past reflection is not sufficient.
             self.is_suspect |= lasts && left_out > 0.0 && share >= MANY_OF_ALL;
         }
     }
@@ -96,14 +96,14 @@ impl Record {
     }
 }
 
-/// Markers that were left out not long ago; none in nearly every frame.
+/// Markers with recent exclusions; usually empty.
 #[derive(Debug, Default)]
 pub(super) struct Suspects {
     records: Vec<Record>,
 }
 
 impl Suspects {
-    /// Takes the outcome of a frame with its fit, trusted or not.
+    /// Updates with the outcome of a frame with a fit, trusted or not.
     pub(super) fn take(&mut self, stamp: Stamp, outcome: &FrameOutcome, solution: &Solution) {
         let in_question = solution.excluded.ids().chain(solution.unclear.ids());
         for id in in_question {
@@ -137,7 +137,7 @@ impl Suspects {
         self.records.retain(|record| !record.is_forgotten());
     }
 
-    /// Refuses the pose of a frame that shows a suspect.
+    /// Refuses the pose of a frame that shows a suspect marker.
     pub(super) fn judge(&self, outcome: FrameOutcome) -> FrameOutcome {
         let shown = self.iter().filter(|suspect| shows(&outcome, suspect.id));
         match shown.max_by(|a, b| a.share.total_cmp(&b.share)) {
@@ -146,7 +146,7 @@ impl Suspects {
         }
     }
 
-    /// Returns those that are suspect now.
+    /// Returns the current suspects.
     pub(super) fn iter(&self) -> impl Iterator<Item = SuspectMarker> {
         self.records.iter().filter_map(Record::suspect)
     }
@@ -156,7 +156,7 @@ impl Suspects {
     }
 }
 
-/// Whether a frame shows a marker where the solver may judge it: not at the edge of the image.
+/// Returns whether a frame shows a marker to the solver, that is, not at the edge of the image.
 fn shows(outcome: &FrameOutcome, id: u32) -> bool {
     let excludes = |solution: &Solution| solution.excluded.contains(id);
     outcome.used_ids.contains(&id) || outcome.solution().is_some_and(excludes)

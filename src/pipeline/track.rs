@@ -1,15 +1,15 @@
-//! What a frame does to the track, and what the track does for a frame.
+//! The track in the pipeline: how frames update it, and how it supports the estimate of a frame.
 //!
-//! The track never touches a single frame's pose. With `initialisation: previous` the iteration starts from
-//! its prediction, and where wrong detections have to be found the same prediction says what is plausible. With an error
-//! budget the track takes only noise and jitter as independent from frame to frame.
+//! The track never changes a single frame's pose. With `initialisation: previous` the iteration starts from its
+//! prediction, and the search for wrong detections uses the same prediction as its prior. With an error budget, the
+//! track takes only noise and jitter as independent from frame to frame.
 
 use nalgebra::Rotation3;
 
 use super::{FrameErrors, FrameOutcome, Refusal, Stamp};
 use crate::tracking::{CheckedFilterSettings, Filter, LastMotion, TrackOutcome};
 
-/// The filter between the frames, or none.
+/// The filter, if tracking is enabled.
 #[derive(Debug)]
 pub(super) struct Tracker(Option<Filter>);
 
@@ -18,7 +18,7 @@ impl Tracker {
         Self(settings.map(Filter::from))
     }
 
-    /// Takes settings for the next frame on; the track stays.
+    /// Changes the settings from the next frame on; the track is kept.
     pub(super) fn set_settings(&mut self, settings: Option<CheckedFilterSettings>) {
         match (&mut self.0, settings) {
             (Some(filter), Some(settings)) => {
@@ -36,7 +36,7 @@ impl Tracker {
         }
     }
 
-    /// Returns the attitude that the track expects; `None` without a confirmed one that reaches so far.
+    /// Returns the predicted attitude; `None` without a confirmed track that reaches the stamp.
     pub(super) fn expected_rotation(&self, stamp: Stamp) -> Option<Rotation3<f64>> {
         let motion = self.0.as_ref()?.predict(stamp.nanoseconds()).ok()?;
         Some(motion.b_from_a.rotation.to_rotation_matrix())
@@ -47,12 +47,12 @@ impl Tracker {
         self.0.as_ref()?.last_motion()
     }
 
-    /// Gives the filter a frame, and enters what came of it in the outcome.
+    /// Updates the filter with a frame, and stores the result in the outcome.
     pub(super) fn follow(&mut self, stamp: Stamp, frame: &mut FrameOutcome, has_causes: bool) {
         let Some(filter) = &mut self.0 else {
             return;
         };
-        // The header of such a frame says nothing that could be believed.
+        // The header of such a frame is not reliable.
         if !frame.header_fits() || matches!(frame.result, Err(Refusal::OtherImage { .. })) {
             return;
         }

@@ -1,9 +1,9 @@
-//! Sigmas that are too small, made as large as the scatter of the residuals shows them to be.
+//! Widening of sigmas that are smaller than the scatter of the residuals.
 //!
-//! Each frame's residuals are held against those of a second before. What is wrong the same way in both, as a marker's
-//! place or the calibration, cancels: it is no noise, and larger sigmas would only let it pass. From the differences is
-//! taken what a pose, or an airframe that bends, explains; the rest is noise of twice the stated variance. That does
-//! not depend on the sigmas in use, so that they do not feed back.
+//! Each frame's residuals are compared with those of a second before. Errors that are the same in both, for example a
+//! marker's position or the calibration, cancel: they are not noise, and larger sigmas would only let them pass. Pose
+//! errors and flex are projected out of the differences; the rest is noise of twice the stated variance. The result
+//! does not depend on the sigmas in use, so there is no feedback.
 
 use std::collections::VecDeque;
 
@@ -16,19 +16,19 @@ use crate::camera::{Camera, Ray};
 use crate::estimation::FlexMode;
 use crate::geometry::skew;
 
-/// s; how far apart the residuals are that are held against each other. Nearer ones would hide errors of a detector
-/// that last for some frames; from farther ones the view differs.
+/// s; time between the residuals that are compared. A shorter time would miss noise that is correlated over some
+/// frames; over a longer one the view changes.
 const LAG_S: f64 = 1.0;
-/// s; a second before means at least, and at most.
+/// s; accepted range of that time.
 const LAG_FROM_TO_S: [f64; 2] = [0.5, 2.0];
-/// s; of frames that come faster some are not kept to hold others against.
+/// s; frames in quicker succession are not all stored.
 const LEAST_STEP_S: f64 = 0.02;
-/// Below it a factor is 1 within its own accuracy.
+/// Smaller factors count as 1: they are within the accuracy of the estimate.
 const LEAST: f64 = 1.05;
-/// Beyond it, it is not sigmas that are wrong.
+/// Largest factor; beyond it, the sigmas are not the cause.
 const MOST: f64 = 10.0;
 
-/// The scatter of the last seconds, and what is made of it.
+/// The scatter of the last seconds, and the resulting factor.
 #[derive(Debug)]
 pub(super) struct Widening {
     /// Residuals of the last second, with their times and stated sigmas.
@@ -47,16 +47,16 @@ impl Default for Widening {
     }
 }
 
-/// What a difference of residuals is looked at with.
+/// The data needed to evaluate a difference of residuals.
 pub(super) struct Sight<'a> {
     pub(super) camera: &'a Camera,
     pub(super) camera_from_tanker: &'a Isometry3<f64>,
-    /// Ways in which the airframe bends.
+    /// Modes in which the airframe bends.
     pub(super) flex: &'a [FlexMode],
 }
 
 impl Widening {
-    /// Returns what stated sigmas are to be multiplied by, 1 or more.
+    /// Returns the factor for stated sigmas, at least 1.
     pub(super) fn factor(&self) -> f64 {
         self.factor
     }
@@ -65,11 +65,11 @@ impl Widening {
         *self = Self::default();
     }
 
-    /// Takes a fit, trusted or not.
+    /// Adds a fit, trusted or not.
     ///
     /// # Inputs
     /// * `residuals`: with sigmas that are the stated ones times the factor.
-    /// * `marker_in_tanker`: where a marker sits, m.
+    /// * `marker_in_tanker`: returns the position of a marker, m.
     pub(super) fn take(
         &mut self,
         now_s: f64,
@@ -82,7 +82,7 @@ impl Widening {
             && now_s < latest_s
         {
             if latest_s - now_s < LAG_S {
-                // A late image: those in order are enough.
+                // A late image; those in order are sufficient.
                 return;
             }
             // A recording that restarts.
@@ -121,8 +121,8 @@ impl Widening {
     }
 }
 
-/// Returns the squared difference of residuals over its variance, without what poses and flex explain, and its degrees
-/// of freedom; `None` where nothing is left.
+/// Returns the squared difference of residuals over its variance, with pose and flex projected out, and its degrees of
+/// freedom; `None` if there are none.
 fn scatter(
     now: &[MarkerResidual],
     earlier: &[MarkerResidual],
@@ -148,7 +148,7 @@ fn scatter(
     }
     let mut explaining = unknowns;
     for mode in 6..unknowns {
-        // None of its markers is seen.
+        // None of the mode's markers is visible.
         if information[(mode, mode)] == 0.0 {
             information[(mode, mode)] = 1.0;
             explaining -= 1;

@@ -1,13 +1,13 @@
-//! Squared residuals of the last seconds over what sigmas promise: their median.
+//! Ratios of squared residuals to their expectation over the last seconds, and their median.
 
 use std::collections::VecDeque;
 
 /// s; older fits are stale.
 pub(super) const WINDOW_S: f64 = 10.0;
-/// s; of frames that come faster some are skipped, which bounds their number.
+/// s; frames in quicker succession are skipped, which bounds their number.
 const LEAST_STEP_S: f64 = 0.002;
 
-/// Ratios of the last seconds: each a chi-squared over its median.
+/// Ratios of the last seconds: chi-squared over its median.
 #[derive(Debug, Default)]
 pub(super) struct Window {
     /// With their times.
@@ -15,14 +15,14 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Returns whether a frame of this time would be taken: not of one that follows too closely.
+    /// Returns whether a frame at this time is used: not if it follows too closely.
     pub(super) fn takes(&self, now_s: f64) -> bool {
         self.ratios.back().is_none_or(|(latest_s, _)| {
             now_s < latest_s - WINDOW_S || now_s >= latest_s + LEAST_STEP_S
         })
     }
 
-    /// Takes a frame's chi-squared.
+    /// Adds a frame's chi-squared.
     pub(super) fn take(&mut self, now_s: f64, chi_squared: f64, degrees_of_freedom: f64) {
         if !self.takes(now_s) {
             return;
@@ -35,7 +35,7 @@ impl Window {
         }
         let ratio = chi_squared / median_of_chi_squared(degrees_of_freedom);
         self.ratios.push_back((now_s, ratio));
-        // One that is older stays, to show that the window is full.
+        // One older value is kept, as evidence that the window is full.
         while self
             .ratios
             .get(1)
@@ -45,7 +45,7 @@ impl Window {
         }
     }
 
-    /// Returns the root of the median, which a few gross errors do not move; `None` without a frame.
+    /// Returns the root of the median, which is robust against a few gross errors; `None` without a frame.
     pub(super) fn factor(&self) -> Option<f64> {
         let mut ratios: Vec<f64> = self.ratios.iter().map(|(_, ratio)| *ratio).collect();
         let middle = ratios.len() / 2;

@@ -1,23 +1,23 @@
-//! The attitude that the tanker should have in the camera, how far a found one is from it, and which wrong angle would
-//! explain that.
+//! The expected attitude of the tanker in the camera, the deviation of an observed one, and which wrong angle would
+//! explain it.
 //!
-//! From one camera a wrong mount and a tanker that flies askew look the same. What tells them apart is that tankers
-//! fly nearly as the receiver does, for as long as it follows them.
+//! With one camera, a wrong mount and a tanker that is not aligned look the same. The distinction: a tanker is nearly
+//! aligned with the receiver for as long as the receiver follows it.
 
 use nalgebra::{Rotation3, UnitQuaternion};
 
 use crate::geometry::{optical_from_body, rotation_from_roll_pitch_yaw};
 
-/// A cause explains a deviation when it leaves no more than this share of it.
+/// A cause explains a deviation if the remaining deviation is at most this share of it.
 const EXPLAINED: f64 = 1.0 / 3.0;
-/// deg; causes that leave nearly the same cannot be distinguished.
+/// deg; causes whose remaining deviations differ by less cannot be distinguished.
 const AS_GOOD_DEG: f64 = 2.0;
-/// Most causes that are named.
+/// Largest number of causes in the message.
 const MOST_CAUSES: usize = 3;
-/// deg; smaller angles have no sign that matters.
+/// deg; the sign of a smaller angle does not matter.
 const NO_ANGLE_DEG: f64 = 0.5;
 
-/// An attitude as the parameters say it: Rz(yaw) Ry(pitch) Rx(roll) about x forward, y left, z up, deg.
+/// An attitude as given by parameters: Rz(yaw) Ry(pitch) Rx(roll) about x forward, y left, z up, deg.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Angles {
     /// Positive: the right side is low.
@@ -31,7 +31,7 @@ pub struct Angles {
 impl Angles {
     const NAMES: [&'static str; 3] = ["roll", "pitch", "yaw"];
 
-    /// Returns the rotation that takes the turned body's coordinates to those of the other.
+    /// Returns the rotation from the rotated body's coordinates to those of the reference.
     #[must_use]
     pub fn rotation(&self) -> Rotation3<f64> {
         let [roll, pitch, yaw] = self.all().map(f64::to_radians);
@@ -77,18 +77,18 @@ impl std::fmt::Display for Angles {
     }
 }
 
-/// How the camera is turned in the receiver, and the tanker should be.
+/// The mount of the camera and the expected attitude of the tanker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExpectedAttitude {
-    /// Of the camera's body axes in the receiver; all zero: it looks ahead, upright.
+    /// Attitude of the camera's body axes in the receiver; all zero: it looks ahead, upright.
     pub mount: Angles,
-    /// Of the tanker relative to the receiver.
+    /// Attitude of the tanker relative to the receiver.
     pub nominal: Angles,
-    /// How far the tanker may be from that, deg.
+    /// Largest accepted deviation from it, deg.
     pub limit_deg: f64,
 }
 
-/// What would make the found attitude the nominal one.
+/// A change that would make the observed attitude the nominal one.
 #[derive(Debug, Clone, PartialEq)]
 struct Cause {
     words: String,
@@ -103,7 +103,7 @@ impl ExpectedAttitude {
         self.mount.rotation() * optical_from_body().inverse()
     }
 
-    /// Returns the turn from the nominal to the found attitude, in the receiver's axes.
+    /// Returns the rotation from the nominal to the observed attitude, in the receiver's axes.
     #[must_use]
     pub fn deviation(&self, camera_from_tanker: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
         UnitQuaternion::from_rotation_matrix(&self.receiver_from_camera())
@@ -111,9 +111,9 @@ impl ExpectedAttitude {
             * UnitQuaternion::from_rotation_matrix(&self.nominal.rotation()).inverse()
     }
 
-    /// Returns what a deviation that lasts means: how far, where the tanker is found, and what would explain it.
+    /// Returns the message about a lasting deviation: its size, the observed attitude, and what would explain it.
     ///
-    /// The verb says whether the tanker "stands" so now, or "stood up to" so far off.
+    /// The verb distinguishes a present deviation ("stands") from the largest of a time ("stood up to").
     #[must_use]
     pub fn in_words(&self, verb: &str, deviation: &UnitQuaternion<f64>) -> String {
         let off_deg = deviation.angle().to_degrees();
@@ -127,7 +127,7 @@ impl ExpectedAttitude {
         )
     }
 
-    /// Returns the causes that explain a deviation, or else the mount that would.
+    /// Returns the causes that explain a deviation, or the mount that would.
     fn explanation(&self, deviation: &UnitQuaternion<f64>) -> String {
         let turn = deviation.to_rotation_matrix();
         // The observation, independent of the assumed mount.
@@ -229,7 +229,8 @@ impl ExpectedAttitude {
     }
 }
 
-/// Returns how far a rotation turns. By its quaternion: of no turn the matrix's trace may give NaN.
+/// Returns the angle of a rotation. Computed from the quaternion, because the trace of a matrix may give NaN near the
+/// identity.
 pub(super) fn angle_deg(rotation: &Rotation3<f64>) -> f64 {
     UnitQuaternion::from_rotation_matrix(rotation)
         .angle()
@@ -255,10 +256,10 @@ fn wrapped(angle_deg: f64) -> f64 {
     angle_deg - 360.0 * turns
 }
 
-/// Returns an angle as people write it: one decimal where there is one.
+/// Returns an angle with one decimal, or without if that is zero.
 fn shown(angle_deg: f64) -> String {
     let rounded = (angle_deg * 10.0).round() / 10.0;
-    // Without the sign of a negative zero.
+    // Adding zero removes the sign of a negative zero.
     format!("{}", rounded + 0.0)
 }
 

@@ -1,4 +1,4 @@
-//! Outside, pre-contact or contact window: where the receptacle is, and how sure that is.
+//! Outside, pre-contact or contact window: the region of the receptacle, with probabilities.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,46 +7,46 @@ use super::probability::{Section, region_probability};
 /// A region about the probe tip, in the receiver's axes (FLU), m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Region {
-    /// All coordinates between those of two corners.
+    /// An axis-aligned box between two corners.
     Box {
         /// The smallest coordinates.
         min: Vector3<f64>,
         /// The largest.
         max: Vector3<f64>,
     },
-    /// About the receiver's x axis through the probe tip.
+    /// A cylinder about the receiver's x axis through the probe tip.
     Cylinder {
-        /// Where it begins along x.
+        /// Its least x.
         min_x_m: f64,
-        /// The state after.
+        /// Its largest x.
         max_x_m: f64,
         /// Its radius.
         radius_m: f64,
     },
 }
 
-/// Where the receptacle is.
+/// The region of the receptacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum EnvelopeState {
-    /// In none of the regions.
+    /// In neither region.
     Outside,
-    /// In the pre-contact region, not in the contact window.
+    /// In the pre-contact region but not in the contact window.
     PreContact,
     /// In the contact window.
     Contact,
 }
 
-/// The regions of an approach. The contact window lies in the pre-contact region.
+/// The regions of an approach. The contact window is inside the pre-contact region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Envelope {
     pre_contact: Region,
     contact: Region,
 }
 
-/// State and probabilities; these add up to one.
+/// State and probabilities, which add up to one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Assessment {
-    /// Where the estimated position lies, whatever its covariance.
+    /// The region of the estimated position, regardless of its covariance.
     pub state: EnvelopeState,
     /// Probability of [`EnvelopeState::Outside`].
     pub outside: f64,
@@ -60,10 +60,10 @@ pub struct Assessment {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnvelopeError {
-    /// Limits that are not finite or enclose nothing.
+    /// Limits that are not finite or describe an empty region.
     #[error("expected finite limits with the smaller first and a radius above zero, got {0:?}")]
     EmptyRegion(Region),
-    /// The contact window reaches beyond the pre-contact region.
+    /// The contact window extends beyond the pre-contact region.
     #[error(
         "expected the contact window inside the pre-contact region, got {contact:?} and {pre_contact:?}"
     )]
@@ -94,9 +94,9 @@ impl Region {
 
     /// Returns the probability that a normally distributed position is inside.
     ///
-    /// Numerical, to 2e-6, or 1e-4 for nearly singular covariances: integrated adaptively along x and y,
-    /// in closed form along z. Each axis is widened by a micrometre, so that any covariance will do. NaN
-    /// when it is not finite or has a negative variance.
+    /// Numerical, to 2e-6, or to 1e-4 for nearly singular covariances: integrated adaptively along x and y, in closed
+    /// form along z. Each axis is widened by a micrometre, so that singular covariances are allowed. NaN if the
+    /// covariance is not finite or has a negative variance.
     #[must_use]
     pub fn probability(&self, mean: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
         let (x_m, section) = match *self {
@@ -158,7 +158,7 @@ impl Region {
                     && self.contains(&Vector3::new(low.x, 0.0, 0.0))
                     && self.contains(&Vector3::new(high.x, 0.0, 0.0))
             }
-            // Both are convex, so of a box the corners decide.
+            // Both are convex, so the corners of a box are sufficient.
             _ => (0..8).all(|corner| {
                 let pick = |axis: usize| {
                     if corner >> axis & 1 == 0 {
@@ -177,8 +177,7 @@ impl Envelope {
     /// Returns an envelope of checked regions.
     ///
     /// # Errors
-    /// [`EnvelopeError`]: a region that encloses nothing, or a contact window that reaches out of the
-    /// pre-contact region.
+    /// [`EnvelopeError`]: an empty region, or a contact window that extends beyond the pre-contact region.
     pub fn new(pre_contact: Region, contact: Region) -> Result<Self, EnvelopeError> {
         for region in [pre_contact, contact] {
             if !region.is_usable() {
@@ -197,7 +196,7 @@ impl Envelope {
         })
     }
 
-    /// Returns state and probabilities of a position, as [`super::ReceptacleEstimate`] has it.
+    /// Returns state and probabilities of a position, as in [`super::ReceptacleEstimate`].
     #[must_use]
     pub fn assess(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> Assessment {
         let contact = self.contact.probability(position, covariance);

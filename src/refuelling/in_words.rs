@@ -1,42 +1,43 @@
-//! Mount, lever arms and nominal attitude as they were understood, in words, and what about them is unlikely.
+//! Mount, lever arms and nominal attitude as sentences for the log, with warnings about implausible ones.
 //!
-//! A wrong lever arm shifts every answer and shows in none. People find it when they read it in words.
+//! A wrong lever arm shifts every result without any visible sign, so it is stated where it can be compared with the
+//! aircraft.
 
 use nalgebra::{Point3, Vector3};
 
 use super::attitude::angle_deg;
 use super::{ExpectedAttitude, RefuellingGeometry};
 
-/// deg; a camera that looks further away from straight ahead sees no tanker there.
+/// deg; a camera that looks farther away from straight ahead cannot see a tanker ahead.
 const MOST_ASIDE_DEG: f64 = 60.0;
-/// deg; a camera that is rolled by more lies on its side.
+/// deg; a camera that is rolled by more is implausible.
 const MOST_ROLLED_DEG: f64 = 45.0;
-/// deg; no tanker is followed at such an attitude.
+/// deg; a larger nominal attitude is implausible.
 const MOST_NOMINAL_DEG: f64 = 30.0;
-/// m; no receiver has its camera or probe further away.
+/// m; a larger distance of camera or probe on a receiver is implausible.
 const MOST_ON_RECEIVER_M: f64 = 30.0;
-/// m; a boom or a hose with all it trails.
+/// m; length of a boom, or of a hose with drogue.
 const MOST_FROM_MARKERS_M: f64 = 40.0;
 /// deg from the optical axis; wider lenses are not used at refuelling distance.
 const WIDEST_DEG: f64 = 60.0;
-/// m and deg; what rounds to nothing is not named.
+/// m and deg; smaller values are not mentioned.
 const NOTHING: f64 = 0.05;
 
-/// What the node has understood, for people to compare with the aircraft.
+/// The configuration as sentences, to be compared with the aircraft.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Understood {
-    /// One thing each.
+    /// One statement each.
     pub lines: Vec<String>,
-    /// What is unlikely about them.
+    /// Implausible values.
     pub warnings: Vec<String>,
 }
 
 impl Understood {
-    /// Returns the words for a mount and a nominal attitude, and for lever arms if there are any.
+    /// Returns the sentences for a mount and a nominal attitude, and for lever arms if there are any.
     ///
     /// # Inputs
     /// * `markers_in_tanker`: of the marker map, m.
-    /// * `need`: markers that a pose needs.
+    /// * `need`: number of markers that a pose needs.
     #[must_use]
     pub fn new(
         expected: &ExpectedAttitude,
@@ -184,7 +185,7 @@ impl Understood {
         }
     }
 
-    /// Whether a pose could be found in contact: a lever arm of the wrong sign often leads past the tanker.
+    /// Checks whether a pose could be found in contact: a lever arm with the wrong sign often leads past the tanker.
     fn add_contact(
         &mut self,
         expected: &ExpectedAttitude,
@@ -217,7 +218,7 @@ impl Understood {
     }
 }
 
-/// Returns a place before a body with x forward, y left, z up: what it is ahead, right and above of.
+/// Returns a position relative to a body with x forward, y left, z up, as distances ahead, right and above.
 fn place(vector_m: &Vector3<f64>) -> String {
     let found = parts(
         &[
@@ -238,7 +239,7 @@ fn place(vector_m: &Vector3<f64>) -> String {
     format!("{}{of}", found.join(", "))
 }
 
-/// Returns each number that is not nothing with its unit and the word for its sign.
+/// Returns each number that is not negligible with its unit and the word for its sign.
 fn parts(numbers: &[(f64, &str, &str)], unit: &str) -> Vec<String> {
     numbers
         .iter()

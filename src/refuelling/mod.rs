@@ -1,7 +1,7 @@
-//! Where the receptacle is before the probe: the tanker's motion in the camera becomes what guidance
-//! flies to and what a boom operator would judge.
+//! The receptacle relative to the probe: from the tanker's motion in the camera to the quantities that guidance and a
+//! boom operator use.
 //!
-//! Knows `geometry`, `frames` and `yaml`; never a clock or the filter. From the motion of the tanker in the
+//! Depends on `geometry`, `frames` and `yaml`, and not on clocks or the filter. From the motion of the tanker in the
 //! camera, the camera's mount, the probe tip and the receptacle:
 //!
 //! ```text
@@ -9,9 +9,9 @@
 //!                    -> closing speed -> outside, pre-contact or contact window, each with its probability
 //! ```
 //!
-//! Axes are those of the `receiver`, FLU (x forward, y left, z up). The receptacle is taken to be rigid to
-//! the tanker's markers, up to [`RefuellingGeometry::receptacle_covariance`]: a drogue on a hose is not,
-//! and needs beacons of its own.
+//! Axes are those of the `receiver`, FLU (x forward, y left, z up). The receptacle is assumed rigid relative to the
+//! tanker's markers, within [`RefuellingGeometry::receptacle_covariance`]. This does not hold for a drogue on a hose,
+//! which needs its own beacons.
 
 mod attitude;
 mod envelope;

@@ -1,26 +1,26 @@
-//! The share of a normal distribution inside a region: two integrals by quadrature, one in closed form.
+//! Probability of a region under a normal distribution: two integrals by quadrature, one in closed form.
 //!
-//! With `Σ = L Lᵀ` and `r = m + L u`, `u` is white. Along `u₂` the region is an interval, whose share is
-//! a difference of two error functions; along `u₁` and `u₀` an adaptive Gauss-Kronrod rule adds up. Where
-//! the middle of the distribution crosses the border the integrand makes a step as wide as what is left of
-//! the distribution, so the range is cut there and on both sides of it.
+//! With `Σ = L Lᵀ` and `r = m + L u`, `u` is white. Along `u₂` the region is an interval, whose probability is a
+//! difference of two error functions; along `u₁` and `u₀` an adaptive Gauss-Kronrod rule integrates. Where the
+//! conditional mean crosses the border, the integrand has a step as wide as the remaining spread, so the range is split
+//! there and on both sides of it.
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::function::erf::erfc;
 
-/// Standard deviations; beyond it lies less than 1e-18.
+/// Standard deviations; the probability beyond is below 1e-18.
 const REACH: f64 = 9.0;
-/// Of the probability, for the outer integral; the inner one is ten times as good.
+/// Absolute tolerance of the outer integral; that of the inner one is a tenth of it.
 const TOLERANCE: f64 = 1e-6;
-/// Halvings of a range at most.
+/// Largest number of bisections of a range.
 const MAX_DEPTH: u32 = 16;
 /// The middle, and three for each of four crossings.
 const CUTS: usize = 13;
-/// A border that the middle of the distribution crosses makes a step that ends this many sigmas away.
+/// The step where the conditional mean crosses a border ends within this many sigmas.
 const STEP_SIGMAS: f64 = 6.0;
-/// Standard deviations; a step wider than this is found without help.
+/// Standard deviations; a wider step is resolved without a split.
 const WIDE_STEP: f64 = 1.0;
-/// m; what a position is uncertain by at least, so that every covariance has a factor.
+/// m; least uncertainty of a position, so that every covariance can be factored.
 const LEAST_SIGMA_M: f64 = 1e-6;
 
 /// A region's section across x.
@@ -38,7 +38,7 @@ impl Section {
         }
     }
 
-    /// The extent along z where it is cut at `y`.
+    /// Returns the extent along z of the section at `y`.
     fn z_at_m(self, y: f64) -> (f64, f64) {
         match self {
             Self::Rectangle { z_m, .. } => z_m,
@@ -49,8 +49,8 @@ impl Section {
         }
     }
 
-    /// Returns where the line `start + u direction` in (y, z) crosses the border, and how fast it does so;
-    /// NaN for what it does not cross.
+    /// Returns where the line `start + u direction` in (y, z) crosses the border, and its rate there; NaN where it does
+    /// not.
     fn crossings(self, start: [f64; 2], direction: [f64; 2]) -> [(f64, f64); 4] {
         match self {
             Self::Rectangle { y_m, z_m } => {
@@ -68,7 +68,7 @@ impl Section {
             Self::Disc { radius_m } => {
                 let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
                 let (a, b) = (dot(direction, direction), dot(start, direction));
-                // NaN where the line passes by.
+                // NaN if the line misses the circle.
                 let root = (b * b - a * (dot(start, start) - radius_m * radius_m)).sqrt();
                 let speed = root / radius_m;
                 let none = (f64::NAN, f64::NAN);
@@ -82,7 +82,7 @@ impl Section {
         }
     }
 
-    /// Returns where to cut the range of `u`, when about the line there is a spread of `spread_m`.
+    /// Returns where to split the range of `u`, for a spread of `spread_m` about the line.
     fn cuts(self, start: [f64; 2], direction: [f64; 2], spread_m: f64) -> [f64; CUTS] {
         let mut cuts = [f64::NAN; CUTS];
         cuts[0] = 0.0;
@@ -98,7 +98,7 @@ impl Section {
     }
 }
 
-/// Returns the probability of a position inside `x_m` and the section; NaN when there is no covariance.
+/// Returns the probability of a position inside `x_m` and the section; NaN for an invalid covariance.
 pub(super) fn region_probability(
     x_m: (f64, f64),
     section: Section,
@@ -140,9 +140,9 @@ fn density(u: f64) -> f64 {
     (-0.5 * u * u).exp() / std::f64::consts::TAU.sqrt()
 }
 
-/// Returns the share of the standard normal distribution between two limits.
+/// Returns the probability of the standard normal distribution between two limits.
 fn normal_between(low: f64, high: f64) -> f64 {
-    // In the tail that both are in, so that small shares are not differences of ones.
+    // Computed in the tail on the side of both limits, so that small probabilities are not differences of ones.
     let tail = |u: f64| 0.5 * erfc(u * std::f64::consts::FRAC_1_SQRT_2);
     let share = if low > 0.0 {
         tail(low) - tail(high)
@@ -152,7 +152,7 @@ fn normal_between(low: f64, high: f64) -> f64 {
     share.max(0.0)
 }
 
-/// Returns the integral over a range, cut at those of `cuts` that lie in it.
+/// Returns the integral over a range, split at those of `cuts` that are inside.
 fn integrate_cut(
     f: &dyn Fn(f64) -> f64,
     (low, high): (f64, f64),

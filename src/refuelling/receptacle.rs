@@ -7,19 +7,19 @@ use nalgebra::{
 use crate::frames::PoseEstimate;
 use crate::geometry::{Matrix12, Motion, PoseCovariance, congruent, set, skew};
 
-/// What is fixed to the two aircraft, from drawings and calibration.
+/// Fixed geometry of the two aircraft, from drawings and calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RefuellingGeometry {
     /// The camera's mount: its optical frame (x right, y down, z ahead) in the receiver (FLU), m.
     pub receiver_from_camera: Isometry3<f64>,
-    /// Covariance of that mount in the receiver's axes. It is the same error in every frame: no filter
-    /// averages it out.
+    /// Covariance of that mount in the receiver's axes. The error is the same in every frame, so a filter does not
+    /// average it out.
     pub mount_covariance: PoseCovariance,
     /// Tip of the probe, receiver frame, m.
     pub probe_tip_in_receiver: Point3<f64>,
     /// Centre of drogue, basket or receptacle, tanker frame, m.
     pub receptacle_in_tanker: Point3<f64>,
-    /// How it deviates from there, covariance in the tanker's axes, m².
+    /// Covariance of its deviation from there, in the tanker's axes, m².
     pub receptacle_covariance: Matrix3<f64>,
 }
 
@@ -33,21 +33,21 @@ pub struct RefuellingGeometryError {
     pub expected: &'static str,
 }
 
-/// A number and its standard deviation.
+/// A value with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertain {
-    /// The number.
+    /// The value.
     pub value: f64,
     /// Its standard deviation.
     pub sigma: f64,
 }
 
-/// The receptacle about the probe tip, in the receiver's axes (FLU).
+/// The receptacle relative to the probe tip, in the receiver's axes (FLU).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReceptacleEstimate {
     /// From the probe tip to the receptacle, m.
     pub receptacle_from_probe: Vector3<f64>,
-    /// Its derivative as the receiver sees it, m/s.
+    /// Its derivative in the receiver's frame, m/s.
     pub velocity_in_receiver: Vector3<f64>,
     /// Of (position, velocity), in m and m/s.
     pub covariance: Matrix6<f64>,
@@ -57,10 +57,10 @@ const FINITE: &str = "finite numbers";
 const COVARIANCE: &str = "a finite, symmetric matrix without negative variances";
 
 impl RefuellingGeometry {
-    /// Returns nothing when the geometry can be used.
+    /// Checks that the geometry is valid.
     ///
     /// # Errors
-    /// [`RefuellingGeometryError`] names the first part that is not finite, or no covariance.
+    /// [`RefuellingGeometryError`] names the first part that is not finite, or not a valid covariance.
     pub fn check(&self) -> Result<(), RefuellingGeometryError> {
         let expect = |fine: bool, what, expected| {
             if fine {
@@ -85,7 +85,7 @@ impl RefuellingGeometry {
         expect(is_finite(probe), "probe_tip_in_receiver", FINITE)?;
         let receptacle = &self.receptacle_in_tanker;
         expect(is_finite(receptacle), "receptacle_in_tanker", FINITE)?;
-        // Zero is allowed, so the eigenvalues decide, up to rounding.
+        // Zero is allowed, so the eigenvalues are checked, up to rounding.
         let m = &self.mount_covariance.0;
         let fine = m.iter().copied().all(f64::is_finite)
             && *m == m.transpose()
@@ -98,10 +98,10 @@ impl RefuellingGeometry {
         expect(fine, "receptacle_covariance", COVARIANCE)
     }
 
-    /// Returns the receptacle about the probe tip.
+    /// Returns the receptacle relative to the probe tip.
     ///
     /// # Inputs
-    /// * `camera_from_tanker`: the track, or its prediction at the time that matters.
+    /// * `camera_from_tanker`: the track, or its prediction at the required time.
     #[must_use]
     pub fn receptacle(&self, camera_from_tanker: &Motion) -> ReceptacleEstimate {
         let receiver_from_receptacle = self.receptacle_motion(camera_from_tanker);
@@ -123,9 +123,9 @@ impl RefuellingGeometry {
         }
     }
 
-    /// Returns the receptacle's motion in the receiver, about the receiver's origin: its attitude is that
-    /// of the tanker. The covariance holds that of the mount too, and in the position the
-    /// receptacle's own deviation from its position, whose motion is unknown.
+    /// Returns the receptacle's motion in the receiver, relative to the receiver's origin, with the tanker's attitude.
+    /// The covariance includes that of the mount and, in the position, that of the receptacle's own deviation, whose
+    /// motion is unknown.
     #[must_use]
     pub fn receptacle_motion(&self, camera_from_tanker: &Motion) -> Motion {
         let tanker_from_receptacle = Isometry3::from_parts(
@@ -137,7 +137,7 @@ impl RefuellingGeometry {
             .seen_from(&self.receiver_from_camera);
         let from_mount =
             found.b_from_a.translation.vector - self.receiver_from_camera.translation.vector;
-        // A mount turned by δθ turns all that was seen: δt = δo + δθ × c, δv = δθ × v, δω = δθ × ω.
+        // An error δθ of the mount rotates all observations: δt = δo + δθ × c, δv = δθ × v, δω = δθ × ω.
         let mut of_mount = SMatrix::<f64, 12, 6>::zeros();
         set(&mut of_mount, 0, 0, &Matrix3::identity());
         set(&mut of_mount, 0, 3, &-skew(from_mount));
@@ -152,8 +152,8 @@ impl RefuellingGeometry {
         found
     }
 
-    /// Returns the receptacle's pose in the receiver, as [`Self::receptacle_motion`] without the motion:
-    /// what one frame says, before any filter.
+    /// Returns the receptacle's pose in the receiver from a single frame, as [`Self::receptacle_motion`] without the
+    /// motion.
     #[must_use]
     pub fn receptacle_pose(&self, camera_from_tanker: &PoseEstimate) -> PoseEstimate {
         let mut covariance = Matrix12::zeros();
@@ -180,10 +180,9 @@ impl ReceptacleEstimate {
         self.covariance.fixed_view::<3, 3>(0, 0).into_owned()
     }
 
-    /// Returns the closing speed along the receiver's x axis, m/s: positive when the probe nears the
-    /// receptacle.
+    /// Returns the closing speed along the receiver's x axis, m/s: positive while the probe approaches the receptacle.
     ///
-    /// Along the axis and not along the line between them: near contact that line has no direction.
+    /// Along the axis rather than the line between them, whose direction is undefined near contact.
     #[must_use]
     pub fn closing_speed_mps(&self) -> Uncertain {
         Uncertain {

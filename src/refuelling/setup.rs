@@ -1,4 +1,4 @@
-//! A refuelling setup's YAML -> checked geometry and envelope, with every error at its line.
+//! Reads a refuelling setup's YAML into checked geometry and envelope; every error has its line.
 //!
 //! ```yaml
 //! name: my_receiver
@@ -11,7 +11,7 @@
 //! contact: {cylinder: {from_x_m: -0.1, to_x_m: 0.4, radius_m: 0.25}}
 //! ```
 //!
-//! No key has a default: a forgotten lever arm would move the receptacle without a word.
+//! No key has a default: a forgotten lever arm would shift the receptacle unnoticed.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 use serde::Deserialize;
@@ -21,19 +21,19 @@ use super::{Envelope, EnvelopeError, RefuellingGeometry, Region};
 use crate::geometry::PoseCovariance;
 use crate::yaml::{self, Place, YamlError};
 
-/// m; no aircraft is larger.
+/// m; larger than any aircraft.
 const FARTHEST_M: f64 = 1000.0;
-/// m; a receptacle that is less certain than this has no place.
+/// m; largest plausible standard deviation.
 const LARGEST_SIGMA_M: f64 = 100.0;
 /// deg; beyond it a covariance is meaningless.
 const LARGEST_SIGMA_DEG: f64 = 10.0;
 
-/// Why a refuelling setup cannot be used; each message begins with the place at fault.
+/// Why a refuelling setup cannot be used; each message begins with the position in the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum RefuellingSetupError {
-    /// No YAML, or not in a setup's shape.
+    /// Not YAML, or not in the format of a setup.
     #[error(transparent)]
     Yaml(#[from] YamlError),
     /// A number that is NaN, infinite or out of range.
@@ -45,7 +45,7 @@ pub enum RefuellingSetupError {
         least: f64,
         most: f64,
     },
-    /// Regions that enclose nothing, or a contact window outside the pre-contact region.
+    /// Empty regions, or a contact window outside the pre-contact region.
     #[error("{place}: {source}")]
     Envelope {
         place: Place,
@@ -53,10 +53,10 @@ pub enum RefuellingSetupError {
     },
 }
 
-/// What is fixed to the two aircraft, and the regions of the approach.
+/// Fixed geometry of the two aircraft, and the regions of the approach.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RefuellingSetup {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The regions of the approach.
     pub envelope: Envelope,
@@ -110,10 +110,10 @@ enum RawRegion {
 }
 
 impl RefuellingSetup {
-    /// Returns the setup that a text describes; `source` is what errors call it.
+    /// Returns the setup in a text; `source` is its name in errors.
     ///
     /// # Errors
-    /// [`RefuellingSetupError`] with file, line and column of the first fault.
+    /// [`RefuellingSetupError`] with file, line and column of the first error.
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, RefuellingSetupError> {
         let raw: RawSetup = yaml::read(text, source)?;
         let read = Reader { source };
@@ -151,7 +151,7 @@ impl RefuellingSetup {
         })
     }
 
-    /// Returns the geometry for a camera turned in the receiver like this: optical axes to FLU.
+    /// Returns the geometry for a camera with this mount: rotation from optical axes to FLU.
     #[must_use]
     pub fn geometry(&self, receiver_from_camera: &Rotation3<f64>) -> RefuellingGeometry {
         RefuellingGeometry {

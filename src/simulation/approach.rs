@@ -1,4 +1,4 @@
-//! A seeded approach to the tanker: the true pose, and what a detector would see, frame by frame.
+//! A seeded approach to the tanker: the true pose and the detections of each frame.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,20 +13,20 @@ use crate::estimation::ErrorBudget;
 use crate::pipeline::Detection;
 use crate::target::MarkerMap;
 
-/// What an approach looks like.
+/// Parameters of an approach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ApproachSettings {
     /// Distance along the receiver's x axis at the start, m.
     pub start_range_m: f64,
-    /// The same at the end, m.
+    /// Distance along the receiver's x axis at the end, m.
     pub end_range_m: f64,
-    /// How long it takes, s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// Images a second.
+    /// Image rate.
     pub rate_hz: f64,
-    /// Noise of the detector on columns and rows, px.
+    /// Noise of the detector in columns and rows, px.
     pub sigma_px: f64,
-    /// How long an error of a detection lasts, s (a Gauss–Markov process of first order); 0: it is another in each image.
+    /// Time constant of the noise, s (a first-order Gauss–Markov process); 0: independent in each image.
     pub noise_time_constant_s: f64,
     /// Gusts: root mean square of the relative acceleration to the left and upwards, each, m/s².
     pub gust_mps2: f64,
@@ -37,8 +37,8 @@ pub struct ApproachSettings {
 }
 
 impl Default for ApproachSettings {
-    /// 60 m to 15 m in 25 s at 30 Hz, half a pixel, ±3°: the last range at which the paper's camera
-    /// still sees the paper's wing tips.
+    /// 60 m to 15 m in 25 s at 30 Hz, half a pixel, ±3°. At 15 m the wing tips of the paper's tanker are still in the
+    /// image of the paper's camera.
     fn default() -> Self {
         Self {
             start_range_m: 60.0,
@@ -54,23 +54,23 @@ impl Default for ApproachSettings {
     }
 }
 
-/// Height of the tanker above the receiver, as a share of the range: the paper's route.
+/// Height of the tanker above the receiver relative to the range: the paper's route.
 const CLIMB: f64 = 0.3;
-/// m; sway to the left and right.
+/// m; lateral sway.
 const SWAY_M: f64 = 0.4;
-/// s; periods of sway, roll, pitch and yaw: air behind a tanker, without a common multiple.
+/// s; periods of sway, roll, pitch and yaw, without a common multiple.
 const PERIODS_S: [f64; 4] = [11.0, 5.3, 7.1, 8.7];
 
 /// s; periods of gusts to the left and upwards, without a common multiple.
 const GUSTS_S: [f64; 4] = [0.7, 1.1, 1.9, 3.1];
 
-/// Stream of the generator that draws the world; images have those from 1 on.
+/// Stream of the generator that draws the world; the images have the streams from 1 on.
 const WORLD_STREAM: u64 = u64::MAX;
-/// About this stream are those of lasting noise.
+/// Streams from here on are those of correlated noise.
 const NOISE_STREAM: u64 = 1 << 41;
-/// Time constants after which an error is forgotten to a thousandth.
+/// Number of time constants after which noise has decayed to a thousandth.
 const NOISE_MEMORY: f64 = 7.0;
-/// Most images that an error is made of.
+/// Largest number of images that contribute to a noise value.
 const MAX_NOISE_IMAGES: f64 = 10_000.0;
 
 /// A seeded approach: the same settings give the same bits.
@@ -80,9 +80,9 @@ pub struct Approach {
     camera: Camera,
     map: MarkerMap,
     phases: [f64; 4],
-    /// To the left and upwards.
+    /// Leftwards and upwards.
     gust_phases: [[f64; GUSTS_S.len()]; 2],
-    /// Where tanker and camera are not as map and calibration have them.
+    /// The true tanker and camera, where they differ from map and calibration.
     world: Option<World>,
 }
 
@@ -93,7 +93,7 @@ pub struct SimulatedFrame {
     pub time_s: f64,
     /// The true pose.
     pub truth_camera_from_tanker: Isometry3<f64>,
-    /// What the detector reports: markers inside the image, with noise.
+    /// The detections: markers inside the image, with noise.
     pub detections: Vec<Detection>,
 }
 
@@ -114,8 +114,8 @@ impl Approach {
         }
     }
 
-    /// Returns the same approach in a world that a budget allows: survey and calibration are drawn once, the airframe
-    /// moves, the image shakes. Camera and map stay what is believed.
+    /// Returns the same approach in a world drawn from a budget: survey and calibration are drawn once, the airframe
+    /// bends over time, the image shakes. Camera and map remain the assumed ones.
     #[must_use]
     pub fn in_a_world_of(self, budget: &ErrorBudget) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
@@ -127,19 +127,19 @@ impl Approach {
         }
     }
 
-    /// Returns how many images it has.
+    /// Returns the number of images.
     #[must_use]
     pub fn frame_count(&self) -> u32 {
         let frames = (self.settings.duration_s * self.settings.rate_hz)
             .round()
             .max(0.0);
-        // Saturates, which is what a count of frames should do.
+        // The conversion saturates, which is right for a number of frames.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let frames = frames as u32;
         frames
     }
 
-    /// Returns image `index`; any order gives the same images.
+    /// Returns image `index`; the order of the calls does not matter.
     #[must_use]
     pub fn frame(&self, index: u32) -> SimulatedFrame {
         let time_s = f64::from(index) / self.settings.rate_hz;
@@ -182,11 +182,11 @@ impl Approach {
         }
     }
 
-    /// Returns the noise of each marker where it lasts, px: the sum of what came new in this image and those before, so
-    /// that it is the same in any order.
+    /// Returns the correlated noise of each marker, px: the sum of the decayed contributions of this image and those
+    /// before, so that it does not depend on the order of the calls.
     fn lasting_noise(&self, index: u32) -> Vec<(u32, [f64; 2])> {
         let images = self.settings.noise_time_constant_s * self.settings.rate_hz;
-        // What is no time constant is none.
+        // An invalid time constant counts as none.
         let lasts = images > 0.0;
         if !lasts {
             return Vec::new();
@@ -196,7 +196,7 @@ impl Approach {
             .map(|marker| (marker.id, [0.0; 2]))
             .collect();
         let mut weight_px = self.settings.sigma_px * (1.0 - kept * kept).sqrt();
-        // At most ten thousand.
+        // Limited to ten thousand above.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let reach = (NOISE_MEMORY * images).clamp(1.0, MAX_NOISE_IMAGES) as u64;
         for back in 0..=reach {
@@ -213,7 +213,7 @@ impl Approach {
         noise
     }
 
-    /// Returns where gusts have moved the tanker to the left and upwards, m.
+    /// Returns the displacement of the tanker by gusts, leftwards and upwards, m.
     fn gust(&self, time_s: f64) -> [f64; 2] {
         self.gust_phases.map(|phases| {
             let waves = GUSTS_S.iter().zip(phases).map(|(period_s, phase)| {
@@ -238,7 +238,7 @@ impl Approach {
         } else {
             1.0
         };
-        // Speed is zero at both ends, as in a commanded move between two stations.
+        // The speed is zero at both ends, as in a commanded move between two stations.
         let range_m =
             end_range_m + (start_range_m - end_range_m) * 0.5 * (1.0 + (PI * progress).cos());
         let wave = |k: usize| (TAU * time_s / PERIODS_S[k] + self.phases[k]).sin();

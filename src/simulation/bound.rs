@@ -1,4 +1,4 @@
-//! The Cramér–Rao bound: no unbiased estimator does better.
+//! The Cramér–Rao bound of a scene's pose.
 
 use nalgebra::{Matrix2x3, Matrix6, Vector3};
 
@@ -6,11 +6,10 @@ use super::Scene;
 use crate::camera::Ray;
 use crate::geometry::{PoseCovariance, skew};
 
-/// Returns the least covariance that an unbiased estimate of a scene's pose can have with `sigma_px`
-/// of noise, in the coordinates of [`PoseCovariance`]; `None` when the markers leave the pose open.
+/// Returns the smallest covariance that an unbiased estimate of a scene's pose can have with `sigma_px` of noise, in
+/// the coordinates of [`PoseCovariance`]; `None` if the markers do not determine the pose.
 ///
-/// Written out apart from the estimator, from the projection at the truth, so that the two can be
-/// held against each other.
+/// Computed independently of the estimator, from the projection at the truth, so that the two can be compared.
 #[must_use]
 pub fn cramer_rao_bound(scene: &Scene, sigma_px: f64) -> Option<PoseCovariance> {
     let pose = scene.truth_camera_from_tanker();

@@ -1,7 +1,7 @@
 //! Seeded scenes and approaches, for tools, Monte Carlo and tests.
 //!
-//! Knows the floors below; the truth it makes is exact, and all randomness comes from a generator
-//! that the caller seeds, so the same seed gives the same bits on every machine.
+//! Depends on the layers below. The simulated truth is exact, and all randomness comes from a generator that the caller
+//! seeds, so the same seed gives the same bits on every machine.
 
 mod approach;
 mod bound;

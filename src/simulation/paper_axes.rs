@@ -50,8 +50,8 @@ pub struct PaperBound {
     pub position_m: f64,
 }
 
-/// Returns the least errors that an unbiased estimate can have, to first order in the noise; `None` when
-/// the markers leave the pose open.
+/// Returns the smallest errors that an unbiased estimate can have, to first order in the noise; `None` if the markers
+/// do not determine the pose.
 #[must_use]
 pub fn paper_bound(scene: &Scene, sigma_px: f64) -> Option<PaperBound> {
     let receiver_from_camera = optical_from_body().inverse();
@@ -77,14 +77,14 @@ pub fn paper_bound(scene: &Scene, sigma_px: f64) -> Option<PaperBound> {
     })
 }
 
-/// Derivative of (yaw, pitch, roll) by a small turn of the tanker about the receiver's axes; `None` at ±90° pitch.
+/// Derivative of (yaw, pitch, roll) by a small rotation of the tanker about the receiver's axes; `None` at ±90° pitch.
 fn angles_by_turn(attitude: &Rotation3<f64>) -> Option<Matrix3<f64>> {
     let (_, pitch, yaw) = attitude.euler_angles();
     let (after_yaw, after_pitch) = (
         Rotation3::from_axis_angle(&Vector3::z_axis(), yaw),
         Rotation3::from_axis_angle(&Vector3::y_axis(), pitch),
     );
-    // Each angle turns about its own axis, moved along by the angles applied after it.
+    // Each angle rotates about its own axis, which the angles applied after it have rotated.
     Matrix3::from_columns(&[
         Vector3::z(),
         after_yaw * Vector3::y(),

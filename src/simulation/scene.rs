@@ -1,4 +1,4 @@
-//! A camera, a tanker and the pose between them; what the image shows, without and with noise.
+//! A camera, a tanker and the pose between them; its image with and without noise.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;

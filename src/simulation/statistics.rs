@@ -1,20 +1,20 @@
-//! What many trials of one method say together.
+//! Statistics of many trials of one method.
 
 use nalgebra::Vector6;
 
 use super::TrialError;
 
-/// degrees; an attitude farther off than this is no measurement any more: refuelling keeps the true
-/// relative angles within ±5°, so the nominal attitude would have been the better answer.
+/// degrees; a larger attitude error counts as a failure. Refuelling keeps the true relative angles within ±5°, so the
+/// nominal attitude itself would be a better answer.
 pub const FAILURE_DEG: f64 = 5.0;
 
-/// Errors of one method in one setting. Root mean squares are over every trial that gave a pose,
-/// failures included; medians are of absolute errors.
+/// Errors of one method in one setting. Root mean squares are over all trials with a pose, failures included; medians
+/// are of absolute errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
-    /// Images.
+    /// Number of images.
     pub trials: usize,
-    /// Images for which the method gave a pose.
+    /// Number of images for which the method found a pose.
     pub solved: usize,
     /// Of each paper coordinate, degrees and metres.
     pub rms: Vector6<f64>,
@@ -22,25 +22,25 @@ pub struct Summary {
     pub median: Vector6<f64>,
     /// Of the angle between found and true attitude, degrees.
     pub rotation_rms_deg: f64,
-    /// The same, median.
+    /// Median of the same.
     pub rotation_median_deg: f64,
     /// Of the distance between found and true position, m.
     pub position_rms_m: f64,
-    /// The same, median.
+    /// Median of the same.
     pub position_median_m: f64,
-    /// Share of the images with more than [`FAILURE_DEG`], or without a pose.
+    /// Share of the images with an attitude error above [`FAILURE_DEG`], or without a pose.
     pub failures: f64,
-    /// Share of the solved images whose iteration ended elsewhere than when started at the truth; `None`
-    /// where that was not asked: see [`TrialError::other_minimum`].
+    /// Share of the solved images whose iteration ended in another minimum than when started at the truth; `None` if
+    /// that was not evaluated: see [`TrialError::other_minimum`].
     pub other_minimum: Option<f64>,
-    /// Median of the iteration's steps.
+    /// Median of the number of steps of the iteration.
     pub iterations_median: u32,
-    /// 95th percentile.
+    /// 95th percentile of the same.
     pub iterations_p95: u32,
 }
 
 impl Summary {
-    /// Returns the summary of one method's trials; NaN where none gave a pose.
+    /// Returns the summary of one method's trials; NaN if none gave a pose.
     #[must_use]
     pub fn new(trials: &[Option<TrialError>]) -> Self {
         let errors: Vec<&TrialError> = trials.iter().flatten().collect();

@@ -1,4 +1,4 @@
-//! One noisy image of a scene, solved by the paper's methods and by ours: the step that Monte Carlo repeats.
+//! One noisy image of a scene, solved by the paper's methods and by ours: one trial of a Monte Carlo experiment.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector6};
 use rand::{Rng, SeedableRng};
@@ -12,14 +12,14 @@ use crate::estimation::{
 };
 use crate::geometry::{chord, optical_from_body};
 
-/// rad; a step that turns by less is the last of an iteration that settles.
+/// rad; an iteration has converged when a step is smaller than this.
 const SETTLED: f64 = 1e-10;
-/// Steps after which an iteration counts as settled in any case.
+/// Steps after which an iteration counts as converged in any case.
 const MAX_ITERATIONS: u32 = 20_000;
-/// rad; two ends of an iteration closer than this are the same minimum.
+/// rad; end points closer than this are the same minimum.
 const SAME_MINIMUM: f64 = 1e-4;
 
-/// A way to a pose that the paper's experiments compare.
+/// A method that the paper's experiments compare.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Method {
     /// `In_M1` alone: rotation from the linear camera matrix, translation by Eq. (13).
@@ -41,13 +41,13 @@ impl Method {
         Self::MaximumLikelihood,
     ];
 
-    /// Returns whether it ends with the orthogonal iteration.
+    /// Returns whether it ends with orthogonal iteration.
     #[must_use]
     pub fn iterates(self) -> bool {
         matches!(self, Self::LinearIterated | Self::NominalIterated)
     }
 
-    /// Returns its name, the paper's where it has one.
+    /// Returns its name, the paper's if it has one.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -62,17 +62,17 @@ impl Method {
 /// When the orthogonal iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stop {
-    /// Where it settles, for all that the statistics can see.
+    /// When it has converged, as far as the statistics can show.
     Converged,
-    /// With the first step that turns by less than this, rad.
+    /// After the first step smaller than this, rad.
     SmallStep(f64),
-    /// With the step after which the attitude is nearer than this to where the iteration settles, rad.
+    /// After the step that brings the attitude within this distance of the converged one, rad.
     NearTheEnd(f64),
-    /// After so many steps.
+    /// After this many steps.
     Steps(u32),
 }
 
-/// What one method made of one image.
+/// Error of one method on one image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrialError {
     /// Found minus true, paper's coordinates, degrees and metres.
@@ -81,20 +81,20 @@ pub struct TrialError {
     pub rotation_deg: f64,
     /// Distance between found and true position, m.
     pub position_m: f64,
-    /// Steps of the orthogonal iteration; 0 for methods without.
+    /// Steps of the orthogonal iteration; 0 for methods without one.
     pub iterations: u32,
-    /// Whether the iteration ended elsewhere than the same iteration started at the truth; `None` for a
-    /// method without iteration, and for one that is stopped before it settles.
+    /// Whether the iteration ended in another minimum than the same iteration started at the truth; `None` for a method
+    /// without iteration, and for one that is stopped early.
     pub other_minimum: Option<bool>,
 }
 
-/// The methods, ready to solve.
+/// The methods, prepared.
 #[derive(Debug, Clone)]
 pub struct Solver {
     maximum_likelihood: Estimator,
 }
 
-/// Returns the generator of one trial: its own stream, so the order and place of the trials do not matter.
+/// Returns the generator of one trial. It has its own stream, so the order of the trials does not matter.
 ///
 /// # Inputs
 /// * `experiment`, `setting`: below 2¹⁶ each; they and the trial are the stream, `seed` is the key.
@@ -107,8 +107,8 @@ pub fn trial_generator(seed: u64, experiment: u16, setting: u16, trial: u32) -> 
 }
 
 impl Default for Solver {
-    /// Aligned airframes are the nominal attitude. As in the paper, any three points will do, no point is left out
-    /// as wrong, and no pose is refused because of another one.
+    /// Aligned airframes are the nominal attitude. As in the paper, three points are sufficient, no point is excluded,
+    /// and no pose is refused because of ambiguity.
     fn default() -> Self {
         Self {
             maximum_likelihood: Estimator::new(EstimatorSettings {
@@ -125,7 +125,7 @@ impl Solver {
     /// Returns the pose and the steps of the orthogonal iteration.
     ///
     /// # Errors
-    /// Any [`EstimateError`]. The paper's methods do not test that the tanker lies in front of the camera.
+    /// Any [`EstimateError`]. The paper's methods do not check that the tanker is in front of the camera.
     pub fn solve(
         &self,
         method: Method,
@@ -156,7 +156,7 @@ impl Solver {
         Ok((iterated.camera_from_tanker, iterated.iterations))
     }
 
-    /// Returns the error of each method on the same noisy image; `None` where a method gives no pose.
+    /// Returns the error of each method on the same noisy image; `None` if a method finds no pose.
     pub fn trial(
         &self,
         scene: &Scene,
@@ -196,7 +196,7 @@ impl Solver {
     }
 }
 
-/// An image as the orthogonal iteration takes it.
+/// An image in the form that the orthogonal iteration takes.
 struct Frame {
     rays: Vec<Ray>,
     markers: Vec<Point3<f64>>,
@@ -225,20 +225,21 @@ impl Frame {
         }
     }
 
-    /// Halves the range of steps in which the attitude comes near the end: each step brings it nearer.
+    /// Bisects the number of steps after which the attitude is near the end, since each step brings it nearer.
     fn iterate_until_near(
         &self,
         seed: &Rotation3<f64>,
         distance_rad: f64,
     ) -> Result<Iterated, EstimateError> {
-        // A step is a small share of the distance that remains, the smaller the slower the iteration.
+        // A step is a small share of the remaining distance, and smaller for a slower iteration.
         let settled = self.iterate(seed, distance_rad * 1e-2, MAX_ITERATIONS)?;
         let end = fixed_point(&self.rays, &self.markers, &rotation_of(&settled))?;
         let is_near =
             |iterated: &Iterated| chord(&rotation_of(iterated), &rotation_of(&end)) < distance_rad;
         let mut far = self.iterate(seed, 0.0, 0)?;
         if is_near(&far) || !is_near(&settled) {
-            // Too many steps rather than too few, if even a hundredth as a last step does not lead near.
+            // If even a last step of a hundredth of the distance does not lead near, use too many steps rather than too
+            // few.
             return Ok(if is_near(&far) { far } else { settled });
         }
         let mut near = settled;

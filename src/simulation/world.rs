@@ -1,4 +1,4 @@
-//! A world that differs from what the estimator believes, drawn from an error budget.
+//! A world that differs from the estimator's assumptions, drawn from an error budget.
 
 use std::f64::consts::TAU;
 
@@ -10,29 +10,29 @@ use crate::camera::{CalibrationChange, Camera, Ray};
 use crate::estimation::{ErrorBudget, Observation};
 use crate::target::Marker;
 
-/// The true camera and tanker beside the believed ones.
+/// The true camera and tanker, and the assumed ones.
 #[derive(Debug, Clone)]
 pub struct World {
-    /// The camera that makes the images.
+    /// The true camera.
     camera: Camera,
-    /// As the map has them.
+    /// Markers as on the map.
     believed: Vec<Marker>,
-    /// Where they are on a tanker that is not bent.
+    /// True positions of the markers on the unbent tanker.
     surveyed: Vec<Point3<f64>>,
     budget: ErrorBudget,
     /// Amplitude of each flex mode in its sigmas.
     flex_sigmas: Vec<f64>,
     /// Phases of the waves that move each flex mode, rad.
     phases: Vec<[f64; WAVES_PER_CONSTANT.len()]>,
-    /// What lasts of the noise of each marker's u and v, in its sigmas; empty where all noise is each frame's own.
+    /// The correlated noise of each marker in u and v, in its sigmas; empty without correlated noise.
     lasting_noise: Vec<[f64; 2]>,
 }
 
-/// Periods of the waves that move one number, in its time constants; without a common multiple.
+/// Periods of the waves that move one amplitude, in time constants; without a common multiple.
 const WAVES_PER_CONSTANT: [f64; 4] = [3.1, 4.7, 7.3, 11.9];
 
 impl World {
-    /// Returns a world as a budget says that it may be: survey, calibration and flex are drawn once.
+    /// Returns a world drawn from a budget: survey, calibration and flex are drawn once.
     pub fn draw(
         camera: &Camera,
         markers: &[Marker],
@@ -73,8 +73,8 @@ impl World {
         }
     }
 
-    /// Returns the world at a time: flex modes with a time constant move as a sum of waves of one sigma altogether, the
-    /// same whatever was asked before. Noise that lasts stays as it is: that of an [`Approach`](super::Approach) is its own.
+    /// Returns the world at a time: flex modes with a time constant move as a sum of waves with a total of one sigma,
+    /// independently of earlier calls. Correlated noise is unchanged: an [`Approach`](super::Approach) has its own.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut world = self.clone();
@@ -87,7 +87,7 @@ impl World {
         world
     }
 
-    /// Returns the camera that makes the images.
+    /// Returns the true camera.
     #[must_use]
     pub fn camera(&self) -> &Camera {
         &self.camera
@@ -99,15 +99,15 @@ impl World {
         &self.flex_sigmas
     }
 
-    /// Sets the amplitudes of the flex modes, in their sigmas; modes that are not listed stay as they are.
+    /// Sets the amplitudes of the flex modes, in their sigmas; modes that are not listed are unchanged.
     pub fn set_flex(&mut self, sigmas: &[f64]) {
         for (amplitude, sigma) in self.flex_sigmas.iter_mut().zip(sigmas) {
             *amplitude = *sigma;
         }
     }
 
-    /// Lets time pass: flex modes with a time constant, and noise that lasts, wander with that constant and one sigma (a
-    /// Gauss–Markov process of first order).
+    /// Advances the time: flex modes with a time constant, and correlated noise, change as first-order Gauss–Markov
+    /// processes with that constant and one sigma.
     pub fn advance(&mut self, seconds: f64, random: &mut impl Rng) {
         let mut wander = |amplitude: &mut f64, time_constant_s: f64| {
             let kept = (-seconds / time_constant_s).exp();
@@ -125,7 +125,7 @@ impl World {
         }
     }
 
-    /// Returns a frame of this world: the true pixels with jitter and noise, beside the places that the map has.
+    /// Returns a frame of this world: the true pixels with jitter and noise, with the marker positions of the map.
     /// Markers behind the camera or outside its lens model are missing.
     pub fn observe(
         &self,
@@ -169,7 +169,7 @@ impl World {
             .collect()
     }
 
-    /// Returns where the bent airframe puts a marker, from where it sits when it is not bent, m.
+    /// Returns the displacement of a marker by the bent airframe, m.
     fn flex_of(&self, id: u32) -> Vector3<f64> {
         let modes = self.budget.flex().iter().zip(&self.flex_sigmas);
         modes

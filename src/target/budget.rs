@@ -1,4 +1,4 @@
-//! The `sigma` and `flex` of a marker map's YAML: what a map and an airframe may have wrong.
+//! The `sigma` and `flex` of a marker map's YAML: errors of a map and an airframe.
 
 use std::collections::BTreeMap;
 
@@ -9,38 +9,38 @@ use serde_saphyr::Spanned;
 use super::{Marker, MarkerMapError, Tag};
 use crate::yaml::Place;
 
-/// Most ways in which an airframe bends.
+/// Largest number of flex modes.
 pub const MAX_FLEX_MODES: usize = 4;
-/// Largest standard deviation of a survey, m: beyond it the unit is wrong.
+/// Largest plausible standard deviation of a survey, m.
 const MAX_SURVEY_M: f64 = 1.0;
-/// Largest standard deviation of a bent airframe, m.
+/// Largest plausible standard deviation of a bent airframe, m.
 const MAX_FLEX_M: f64 = 10.0;
-/// Largest part of a shape: a shape is 1 where the airframe moves by its sigma.
+/// Largest component of a shape; a shape is 1 where the airframe moves by its sigma.
 const MAX_SHAPE: f64 = 10.0;
-/// Longest time constant, s; what lasts longer lasts for the flight.
+/// Longest time constant, s; anything longer is constant for the flight.
 const MAX_TIME_CONSTANT_S: f64 = 1.0e5;
 const MIN_TIME_CONSTANT_S: f64 = 0.01;
-/// Factor from the error of a tag to those of its corners. They move together; four independent errors of twice the
-/// size move their mean as far.
+/// Factor from the error of a tag to those of its corners. The corners move together; four independent errors of twice
+/// the size move their mean by the same amount.
 const CORNER_FACTOR: f64 = 2.0;
 
-/// What a map and the airframe may have wrong, standard deviations.
+/// Errors of a map and the airframe, standard deviations.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapBudget {
     /// Marker id and standard deviation of each of its coordinates, m; ascending id, only those above 0.
     pub survey_sigma_m: Vec<(u32, f64)>,
-    /// Ways in which the airframe bends.
+    /// Modes in which the airframe bends.
     pub flex: Vec<Flex>,
 }
 
-/// A way in which the airframe bends.
+/// A mode in which the airframe bends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flex {
     /// Its name.
     pub name: String,
     /// Standard deviation of its amplitude, m.
     pub sigma_m: f64,
-    /// How long an amplitude lasts, s; `None`: for the whole flight.
+    /// Time constant of its amplitude, s; `None`: constant for the whole flight.
     pub time_constant_s: Option<f64>,
     /// Marker id and displacement for an amplitude of 1, tanker frame; ascending id.
     pub shape: Vec<(u32, Vector3<f64>)>,
@@ -77,7 +77,7 @@ struct RawShape {
     z: f64,
 }
 
-/// Returns the budget: `of_map` for markers without a sigma of their own, which come in the order of the text.
+/// Returns the budget. `of_map` is for markers without a sigma of their own; markers are in the order of the text.
 pub(super) fn budget(
     of_map: Option<&Spanned<f64>>,
     of_markers: &[(u32, Option<&Spanned<f64>>)],
@@ -179,7 +179,7 @@ impl RawFlex {
                     place: place(),
                     name: name.clone(),
                 })?;
-            // A comparison with what is not a number is false.
+            // A comparison with NaN is false.
             let is_within = shift.norm() <= MAX_SHAPE;
             if !is_within {
                 return Err(MarkerMapError::FlexShape {

@@ -1,27 +1,27 @@
-//! What markers must satisfy to make a map.
+//! Requirements on the markers of a map.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::{Marker, MarkerMapError};
 use crate::yaml::Place;
 
-/// Markers that any pose needs.
+/// Number of markers that any pose needs.
 const MIN_MARKERS: usize = 3;
 
-/// Farthest coordinate, m: a hundred times the largest tanker, so beyond it the unit is wrong.
+/// Largest plausible coordinate, m: a hundred times the largest tanker.
 pub const MAX_COORDINATE_M: f64 = 1.0e3;
 
-/// Least distance between two markers, m: below it they are one marker entered twice.
+/// Least distance between two markers, m: closer ones are probably one marker entered twice.
 const MIN_DISTANCE_M: f64 = 1.0e-3;
 
-/// Least spread of the markers across their best line, as a part of the spread along it.
+/// Least spread of the markers across their best line, relative to the spread along it.
 ///
-/// Second over first singular value of the centred points, so free of scale. At one thousandth the
-/// markers along a 14 m wing stray from a line by about a centimetre, a third of a pixel where the wing
-/// fills the paper's image: the rotation about that line would be noise.
+/// Second over first singular value of the centred points, so independent of scale. At one thousandth the markers along
+/// a 14 m wing deviate from a line by about a centimetre, a third of a pixel if the wing fills the paper's image: the
+/// rotation about that line would be noise.
 const MIN_SPREAD: f64 = 1.0e-3;
 
-/// A part of a map that an error can point to.
+/// A part of a map, for the position of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     /// All markers together.
@@ -32,10 +32,10 @@ pub(super) enum Part {
     Coordinate(usize, usize),
 }
 
-/// Checks markers in the order given; `place` tells where a part was written.
+/// Checks markers in the given order; `place` returns the position of a part in the file.
 ///
 /// # Errors
-/// Any [`MarkerMapError`] but those of reading.
+/// Any [`MarkerMapError`] except those of reading.
 pub(super) fn check(
     markers: &[Marker],
     place: impl Fn(Part) -> Place,

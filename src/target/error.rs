@@ -3,21 +3,21 @@
 use crate::text::quoted;
 use crate::yaml::{Place, YamlError};
 
-/// Why a marker map cannot be used; each message begins with the place at fault.
+/// Why a marker map cannot be used; each message begins with the position in the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "a variant's message names its fields")]
 pub enum MarkerMapError {
-    /// No YAML, or not in a marker map's shape.
+    /// Not YAML, or not in the format of a marker map.
     #[error(transparent)]
     Yaml(#[from] YamlError),
-    /// An id that detections cannot carry.
+    /// An id that does not fit into a detection.
     #[error("{place}: marker id must be 0 to {max}, got {id}", max = u32::MAX)]
     IdOutOfRange { place: Place, id: i64 },
-    /// One id for two markers.
+    /// An id that two markers have.
     #[error("{place}: marker id {id} is already taken at {first}")]
     DuplicateId { place: Place, id: u32, first: Place },
-    /// Fewer markers than any pose needs.
+    /// Too few markers for a pose.
     #[error("{place}: need at least {need} markers for a pose, got {got}")]
     TooFewMarkers {
         place: Place,
@@ -32,7 +32,7 @@ pub enum MarkerMapError {
         axis: char,
         value: f64,
     },
-    /// A coordinate that no aircraft reaches: a wrong unit or a slipped digit.
+    /// An implausible coordinate: a wrong unit or a slipped digit.
     #[error(
         "{place}: {axis} of marker {id} must be within {limit_m} m of the origin, got {value_m} m"
     )]
@@ -43,7 +43,7 @@ pub enum MarkerMapError {
         value_m: f64,
         limit_m: f64,
     },
-    /// Two markers at one place.
+    /// Two markers at the same position.
     #[error(
         "{place}: marker {id} is {distance_m} m from marker {other} at {other_place}, must be at least {need_m} m"
     )]
@@ -55,15 +55,15 @@ pub enum MarkerMapError {
         distance_m: f64,
         need_m: f64,
     },
-    /// All markers on one line: the rotation about it can't be seen.
+    /// All markers are collinear: the rotation about their line cannot be observed.
     #[error(
         "{place}: all markers lie on one line (spread across it is {ratio:.1e} of that along it, need {need:.0e})"
     )]
     OnOneLine { place: Place, ratio: f64, need: f64 },
-    /// A tag id whose corners would have no ids.
+    /// A tag id that is too large: its corners would have no ids.
     #[error("{place}: tag id must be 0 to {max}, got {id}", max = super::Tag::MAX_ID)]
     TagIdOutOfRange { place: Place, id: i64 },
-    /// One id for two tags.
+    /// An id that two tags have.
     #[error("{place}: tag id {id} is already taken at {first}")]
     DuplicateTag { place: Place, id: u32, first: Place },
     /// A single marker with the id of a tag's corner.
@@ -71,7 +71,7 @@ pub enum MarkerMapError {
         "{place}: marker id {id} is that of a corner of the tag at {tag} (10 x tag id + corner)"
     )]
     CornerId { place: Place, id: u32, tag: Place },
-    /// A side that no tag has.
+    /// An implausible side length.
     #[error("{place}: size_m of tag {id} must be {least_m} to {most_m} m, got {size_m:?}")]
     TagSize {
         place: Place,
@@ -80,7 +80,7 @@ pub enum MarkerMapError {
         least_m: f64,
         most_m: f64,
     },
-    /// A number of a tag's pose that is NaN, infinite or far off.
+    /// A number of a tag's pose that is NaN, infinite or implausible.
     #[error("{place}: {field} of tag {id} must be from -{limit} to {limit}, got {value:?}")]
     TagNumber {
         place: Place,
@@ -89,15 +89,15 @@ pub enum MarkerMapError {
         value: f64,
         limit: f64,
     },
-    /// No attitude, half of one, or two.
+    /// No attitude, an incomplete one, or two.
     #[error(
         "{place}: tag {id} needs its attitude, as roll_deg, pitch_deg and yaw_deg or as qx, qy, qz and qw"
     )]
     TagAttitude { place: Place, id: u32 },
-    /// A quaternion that is no rotation.
+    /// A quaternion that is not normalised.
     #[error("{place}: the quaternion of tag {id} must have length 1, got {norm}")]
     TagQuaternion { place: Place, id: u32, norm: f64 },
-    /// A family that detectors cannot name.
+    /// A family that is not a single word.
     #[error(
         "{place}: family of tag {id} must be one word such as tag36h11, got {}",
         quoted(family)
@@ -107,7 +107,7 @@ pub enum MarkerMapError {
         id: u32,
         family: String,
     },
-    /// A standard deviation that is not one, or in another unit.
+    /// An implausible standard deviation.
     #[error("{place}: {of} must be 0 to {most_m} m, got {value_m}")]
     Sigma {
         place: Place,
@@ -115,7 +115,7 @@ pub enum MarkerMapError {
         value_m: f64,
         most_m: f64,
     },
-    /// A time in which no airframe bends.
+    /// An implausible time constant.
     #[error(
         "{place}: time_constant_s of flex mode `{name}` must be {least_s} to {most_s} s, got {value_s}; leave it out for a shape that lasts for the whole flight"
     )]
@@ -126,15 +126,15 @@ pub enum MarkerMapError {
         least_s: f64,
         most_s: f64,
     },
-    /// A shape of a marker that is not on the map.
+    /// A shape refers to a marker that is not on the map.
     #[error(
         "{place}: the shape of flex mode `{name}` must name a marker (`id`) or a tag (`tag`) of the map"
     )]
     FlexMarker { place: Place, name: String },
-    /// One marker twice in a shape.
+    /// A shape lists a marker twice.
     #[error("{place}: flex mode `{name}` moves marker {id} twice")]
     FlexMarkerTwice { place: Place, name: String, id: u32 },
-    /// A displacement that is no number, or in metres rather than in amplitudes.
+    /// A displacement that is not a number, or is given in metres rather than relative to the amplitude.
     #[error(
         "{place}: a displacement of flex mode `{name}` must be at most {most} times its amplitude, got {length}"
     )]
@@ -144,10 +144,10 @@ pub enum MarkerMapError {
         length: f64,
         most: f64,
     },
-    /// One name for two modes.
+    /// Two modes have the same name.
     #[error("{place}: flex mode `{name}` is defined twice")]
     DuplicateFlex { place: Place, name: String },
-    /// More modes than the estimator has room for.
+    /// Too many flex modes.
     #[error("{place}: a map may have at most {most} flex modes, got {got}")]
     TooManyFlexModes {
         place: Place,

@@ -1,4 +1,4 @@
-//! A marker map's YAML -> a checked map, with every error at its line.
+//! Reads a marker map's YAML into a checked map; every error has its line.
 
 use nalgebra::Point3;
 use serde::Deserialize;
@@ -18,7 +18,7 @@ struct RawMap {
     markers: Spanned<Vec<RawMarker>>,
     #[serde(default)]
     tags: Vec<RawTag>,
-    /// Of all markers and tags without their own, m.
+    /// For all markers and tags without their own, m.
     sigma: Option<Spanned<f64>>,
     #[serde(default)]
     flex: Vec<RawFlex>,
@@ -28,7 +28,7 @@ fn nothing() -> Spanned<Vec<RawMarker>> {
     Spanned::new(Vec::new(), Location::UNKNOWN, Location::UNKNOWN)
 }
 
-/// `id` is wider than ids are, so that one out of range is reported as such.
+/// `id` is wider than ids are, so that an id out of range is reported as such.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawMarker {
@@ -57,11 +57,11 @@ impl MarkerMap {
     /// ```
     ///
     /// # Inputs
-    /// * `text`: the YAML, in the shape shown above; an unknown key is an error.
-    /// * `source`: what errors call the text, usually its path.
+    /// * `text`: the YAML, in the format shown above; an unknown key is an error.
+    /// * `source`: the name of the text in errors, usually its path.
     ///
     /// # Errors
-    /// Any [`MarkerMapError`], with the line and column of the value at fault.
+    /// Any [`MarkerMapError`], with line and column of the invalid value.
     pub fn from_yaml(text: &str, source: &str) -> Result<Self, MarkerMapError> {
         read(text, source)
     }
@@ -83,7 +83,7 @@ fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
     check(&markers, |part| {
         let (id, x, y, z) = match part {
             Part::Markers => return Place::at(source, raw.markers.referenced),
-            // Corners stand behind the single markers, four for each tag.
+            // Corners follow the single markers, four for each tag.
             Part::Id(index) | Part::Coordinate(index, _) => {
                 match index.checked_sub(entries.len()) {
                     None => {
@@ -139,7 +139,7 @@ impl RawMarker {
     }
 }
 
-/// Checks that no single marker has the id of a corner; `places` of a marker and a tag, by index.
+/// Checks that no single marker has the id of a corner; `places` returns the positions of a marker and a tag, by index.
 fn check_corner_ids(
     markers: &[Marker],
     tags: &[Tag],

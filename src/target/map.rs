@@ -1,4 +1,4 @@
-//! A checked marker map, and those that come with the program.
+//! The checked marker map, and the shipped maps.
 
 use nalgebra::Point3;
 
@@ -6,18 +6,18 @@ use super::check;
 use super::{MapBudget, Marker, MarkerMapError, Tag};
 use crate::yaml::Place;
 
-/// A checked marker map: at least three markers, ids unique, not all on one line.
+/// A checked marker map: at least three markers, unique ids, not collinear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarkerMap {
     name: String,
-    /// Ascending id; the corners of tags among them.
+    /// Ascending id; includes the corners of tags.
     markers: Vec<Marker>,
     /// Ascending id.
     tags: Vec<Tag>,
     budget: MapBudget,
 }
 
-/// Name and text of each map that comes with the program.
+/// Name and text of each shipped map.
 const SHIPPED: [(&str, &str); 2] = [
     ("paper", include_str!("../../config/tankers/paper.yaml")),
     ("fin6", include_str!("../../config/tankers/fin6.yaml")),
@@ -27,7 +27,7 @@ impl MarkerMap {
     /// Returns the checked map from markers in any order.
     ///
     /// # Errors
-    /// Every variant of [`MarkerMapError`] but those of reading; places name the map, without a line.
+    /// Every variant of [`MarkerMapError`] except those of reading; positions name the map, without a line.
     pub fn new(name: &str, markers: &[Marker]) -> Result<Self, MarkerMapError> {
         let whole = Place::whole(&format!("marker map `{name}`"));
         check::check(markers, |_| whole.clone())?;
@@ -39,15 +39,15 @@ impl MarkerMap {
         ))
     }
 
-    /// Returns a map that comes with the program; `None` if no such map is shipped.
+    /// Returns a shipped map; `None` if there is none of that name.
     #[must_use]
     pub fn shipped(name: &str) -> Option<Self> {
         let (name, text) = SHIPPED.iter().find(|(shipped, _)| *shipped == name)?;
-        // That each of them passes its checks is a test's promise.
+        // A test checks that each of them is valid.
         Self::from_yaml(text, &format!("config/tankers/{name}.yaml")).ok()
     }
 
-    /// Returns the names that [`Self::shipped`] knows.
+    /// Returns the names of the shipped maps.
     pub fn shipped_names() -> impl Iterator<Item = &'static str> {
         SHIPPED.iter().map(|(name, _)| *name)
     }
@@ -58,19 +58,19 @@ impl MarkerMap {
         &self.name
     }
 
-    /// Returns all markers, ascending id; the corners of tags are among them.
+    /// Returns all markers, ascending id, including the corners of tags.
     #[must_use]
     pub fn markers(&self) -> &[Marker] {
         &self.markers
     }
 
-    /// Returns what the map and the airframe may have wrong.
+    /// Returns the error budget of the map and the airframe.
     #[must_use]
     pub fn budget(&self) -> &MapBudget {
         &self.budget
     }
 
-    /// Returns where a marker sits, tanker frame, m; `None` for an id that the map does not hold.
+    /// Returns the position of a marker, tanker frame, m; `None` for an id that is not on the map.
     #[must_use]
     pub fn get(&self, id: u32) -> Option<Point3<f64>> {
         let index = self
@@ -80,14 +80,14 @@ impl MarkerMap {
         Some(self.markers[index].marker_in_tanker)
     }
 
-    /// Returns the tag with this id; `None` if the map holds no such tag.
+    /// Returns the tag with this id; `None` if it is not on the map.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&Tag> {
         let index = self.tags.binary_search_by_key(&id, |tag| tag.id).ok()?;
         Some(&self.tags[index])
     }
 
-    /// Returns where a marker sits that is no tag's corner, tanker frame, m.
+    /// Returns the position of a marker that is not the corner of a tag, tanker frame, m.
     #[must_use]
     pub fn single(&self, id: u32) -> Option<Point3<f64>> {
         let is_corner = Tag::id_of_corner(id).is_some_and(|tag| self.tag(tag).is_some());

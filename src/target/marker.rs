@@ -7,7 +7,7 @@ use nalgebra::Point3;
 pub struct Marker {
     /// Its id in detections.
     pub id: u32,
-    /// Where it sits, tanker frame, m.
+    /// Its position, tanker frame, m.
     pub marker_in_tanker: Point3<f64>,
 }
 

@@ -1,11 +1,11 @@
-//! What the tanker carries: marker id -> point on the tanker; tag id -> its four corners, as four such points.
+//! Markers on the tanker: from marker id to point; from tag id to its four corners, which are markers too.
 //!
-//! A [`MarkerMap`] exists only checked: ids unique, coordinates sane, and the points spread enough
-//! that a pose can follow from them. Knows the tanker frame (x forward, y left, z up; metres) and
-//! text that a caller brings; never pixels, files or whether a marker is in view.
+//! A [`MarkerMap`] can only be constructed through its checks: unique ids, plausible coordinates, and points that are
+//! spread enough to determine a pose. Depends on the tanker frame (x forward, y left, z up; metres) and on text from
+//! the caller, and not on pixels, files or visibility.
 //!
-//! Which of the markers a frame shows is `estimation`'s business: a map that passes here can still
-//! lose its pose in a frame that shows only three of them, and those in line.
+//! `estimation` checks the markers of each frame: with a valid map, a frame that shows only three collinear markers
+//! still has no pose.
 
 mod budget;
 mod check;

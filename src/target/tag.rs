@@ -2,34 +2,34 @@
 
 use nalgebra::{Isometry3, Point3};
 
-/// Ids of points that one tag takes up: ten, so that people can read tag and corner from a point's id.
+/// Ids of points reserved for one tag: ten, so that tag and corner can be read from a point's id.
 const IDS_PER_TAG: u32 = 10;
 
-/// Corners of a tag, in the order in which detectors name them.
+/// Corners of a tag, in the order of detectors.
 const CORNERS: [(f64, f64); 4] = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
 
 /// A square tag on the tanker.
 ///
-/// Its frame is that of `apriltag_ros`: the origin in the tag's centre; seen from in front of the upright
-/// tag, x to the right, y up, z out of its face. The corners go round against the clock from the
-/// bottom left one, as those of `apriltag_msgs/AprilTagDetection` do.
+/// Its frame is that of `apriltag_ros`: the origin in the tag's centre; seen from in front of the upright tag, x to the
+/// right, y up, z out of its face. The corners go anticlockwise from the bottom left one, as those of
+/// `apriltag_msgs/AprilTagDetection`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tag {
     /// Its id in its family.
     pub id: u32,
-    /// Its family; `None` where any will do.
+    /// Its family; `None` accepts any.
     pub family: Option<String>,
-    /// Length of a side, between the corners that are detected, m.
+    /// Length of a side between the detected corners, m.
     pub size_m: f64,
     /// Its pose on the tanker.
     pub tanker_from_tag: Isometry3<f64>,
 }
 
 impl Tag {
-    /// Largest id whose corners still have ids.
+    /// Largest id whose corners have valid ids.
     pub const MAX_ID: u32 = (u32::MAX - 3) / IDS_PER_TAG;
 
-    /// Returns ids and places (tanker frame, m) of the corners: bottom left, bottom right, top right, top left.
+    /// Returns ids and positions (tanker frame, m) of the corners: bottom left, bottom right, top right, top left.
     #[must_use]
     pub fn corners(&self) -> [(u32, Point3<f64>); 4] {
         let mut id = self.id * IDS_PER_TAG;
@@ -41,7 +41,7 @@ impl Tag {
         })
     }
 
-    /// Returns whether a detector's name of a family means this tag's: `tag36h11` and `36h11` are the same.
+    /// Returns whether a detector's family name is this tag's family: `tag36h11` and `36h11` are the same.
     #[must_use]
     pub fn is_of_family(&self, name: &str) -> bool {
         let bare = |name: &str| name.strip_prefix("tag").unwrap_or(name).to_owned();
@@ -50,7 +50,7 @@ impl Tag {
             .is_none_or(|family| bare(family) == bare(name))
     }
 
-    /// Returns the id of the tag that a point would be a corner of; `None` for an id that no corner has.
+    /// Returns the id of the tag to which a point belongs as a corner; `None` if the id is not that of a corner.
     pub(super) const fn id_of_corner(point: u32) -> Option<u32> {
         if point % IDS_PER_TAG < 4 {
             Some(point / IDS_PER_TAG)

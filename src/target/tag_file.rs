@@ -1,4 +1,4 @@
-//! The `tags:` of a marker map's YAML -> checked tags, with every error at its line.
+//! Reads the `tags:` of a marker map's YAML into checked tags; every error has its line.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -9,14 +9,14 @@ use super::{MarkerMapError, Tag};
 use crate::geometry::rotation_from_roll_pitch_yaw;
 use crate::yaml::Place;
 
-/// Sides that tags have, m: beyond them the unit is wrong.
+/// Plausible side lengths, m.
 const MIN_SIZE_M: f64 = 0.01;
 const MAX_SIZE_M: f64 = 100.0;
 
-/// How far a quaternion's length may be from 1, as ROS has it.
+/// Tolerance of a quaternion's length, as in ROS.
 const QUATERNION_TOLERANCE: f64 = 0.01;
 
-/// `id` is wider than ids are, so that one out of range is reported as such.
+/// `id` is wider than ids are, so that an id out of range is reported as such.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawTag {
@@ -114,7 +114,7 @@ impl RawTag {
         Ok(Some(name.to_owned()))
     }
 
-    /// Returns the rotation `tanker_from_tag`; one of its two ways to write must be there, complete.
+    /// Returns the rotation `tanker_from_tag`; exactly one of its two forms must be given, complete.
     fn attitude(
         &self,
         id: u32,

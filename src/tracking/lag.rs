@@ -1,23 +1,23 @@
-//! Does the track lag? What the innovations of a few frames say together.
+//! Detection of a lagging track from the innovations of several frames.
 
 use nalgebra::Vector6;
 
 /// Weight of the newest innovation.
 const WEIGHT: f64 = 0.2;
-/// Frames over which the mean is taken, so to speak: the variance of one over that of the mean.
+/// Effective number of frames in the mean: the variance of one innovation over that of the mean.
 pub(super) const MEMORY_FRAMES: f64 = (2.0 - WEIGHT) / WEIGHT;
-/// s; a manoeuvre is taken to last this long after its last sign.
+/// s; a manoeuvre is assumed to continue this long after the last indication.
 const HOLD_S: f64 = 5.0;
 
 /// The fading mean of the whitened innovations.
 ///
-/// Innovations of a right model are white, of unit variance and mean zero. When the tanker moves more
-/// than the noise allows, they lean to one side, long before a single one is large enough for the gate.
+/// Innovations of a correct model are white, with unit variance and zero mean. If the tanker accelerates more than the
+/// process noise allows, they become biased, long before a single one exceeds the gate.
 ///
 /// # Source
-/// Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, section
-/// 11.2 (adjustable level process noise). DIFFERENCE: a mean of vectors instead of squares, since a lag
-/// has a direction and noise has none.
+/// Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, section 11.2 (adjustable
+/// level process noise). DIFFERENCE: a mean of vectors instead of squares, because a lag has a direction and noise does
+/// not.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Lag {
     mean: Vector6<f64>,
@@ -25,7 +25,7 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// Returns whether the larger noise is in force.
+    /// Returns whether the larger process noise is in use.
     pub(super) fn is_manoeuvring(&self) -> bool {
         self.hold_s > 0.0
     }

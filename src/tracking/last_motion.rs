@@ -1,12 +1,12 @@
-//! The last motion that a filter believed, which outlives its track: good enough to say where to look.
+//! The last motion of a filter, which outlives its track; it is used to predict where to look.
 
 use super::Filter;
 use super::model::{Noise, predict};
 use super::track::{Track, seconds};
 use crate::geometry::Motion;
 
-/// A motion with what makes it unknown over time. It says nothing about whether anybody should fly by it: a track
-/// ends [`max_gap_s`](super::FilterSettings::max_gap_s) after its last frame, and this goes on.
+/// A motion with growing uncertainty. It is not meant for guidance: a track ends
+/// [`max_gap_s`](super::FilterSettings::max_gap_s) after its last frame, while this continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LastMotion {
     pub(super) track: Track,
@@ -21,13 +21,13 @@ impl LastMotion {
         &self.track.motion
     }
 
-    /// Returns whether it is that of a track, and not of a candidate for one.
+    /// Returns whether it is from a confirmed track rather than from a candidate.
     #[must_use]
     pub fn is_confirmed(&self) -> bool {
         self.is_confirmed
     }
 
-    /// Returns the motion at a stamp, with its growing covariance; `None` before the last accepted frame.
+    /// Returns the motion at a stamp, with its increased covariance; `None` before the last accepted frame.
     #[must_use]
     pub fn at(&self, stamp_ns: i64) -> Option<Motion> {
         let gap_s = seconds(stamp_ns, self.track.stamp_ns);

@@ -1,47 +1,48 @@
-//! Errors that frames have in common: carried beside the motion, never averaged out.
+//! Errors that frames have in common: propagated with the motion, never averaged out.
 //!
 //! A survey error, a bent wing or a wrong focal length shifts the pose of every frame in nearly the same way. A filter
-//! that takes such poses as independent becomes sure of a wrong position. Here each cause `c` of unit variance is a
-//! consider state: it is not estimated, but its covariance with the motion is kept. With `δ` the error of the motion,
-//! two matrices are carried, and `P` is what is published:
+//! that treats such poses as independent becomes overconfident about a wrong position. Here each cause `c` of unit
+//! variance is a consider state: it is not estimated, but its covariance with the motion is propagated. With `δ` the
+//! error of the motion, two matrices are propagated, and `P` is published:
 //!
 //! ```text
 //! Q = cov(δ | c)      U = E[δ cᵀ]      P = Q + U Uᵀ
 //! ```
 //!
-//! With `B` the shifts that one sigma of each cause makes in a frame, `N` the noise of its own, `H = (I 0)`:
+//! With `B` the shifts that one sigma of each cause makes in a frame, `N` the frame's independent noise, `H = (I 0)`:
 //!
 //! | step | formula |
 //! |---|---|
-//! | start | `U = −H' B`, since the pose itself is the first belief |
+//! | start | `U = −H' B`, since the pose itself is the initial state |
 //! | predict | `U ← a Φ U`, `Q ← Φ Q Φᵀ + (1 − a²) Φ U Uᵀ Φᵀ + noise`; `a = exp(−dt/τ)`, 1 for a constant cause |
 //! | innovation | `W = H U + B`, `S = H Q Hᵀ + W Wᵀ + N` |
 //! | update | `K = (Q Hᵀ + U Wᵀ) S⁻¹`, `Q ← (I − K H) Q (I − K H)ᵀ + K N Kᵀ`, `U ← U − K W` |
 //!
 //! # Source
-//! Schmidt, *Application of state-space methods to navigation problems*, 1966 (consider states). DIFFERENCE: given the
-//! causes, the error of the motion has a covariance of its own, so that `P` stays positive definite by its form.
+//! Schmidt, *Application of state-space methods to navigation problems*, 1966 (consider states). DIFFERENCE: the
+//! covariance of the motion's error given the causes is propagated separately, so that `P` is positive definite by
+//! construction.
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
 use super::model::{Correction, LastingSums, Transition, turned};
 use crate::geometry::{Matrix12, Vector12, principal_root};
 
-/// Causes that are carried one by one; the smaller ones of a larger budget are carried together. A claim about their
-/// motion would then be wrong, so those with a time constant count as constant and as noise.
+/// Largest number of causes with a column each. The smaller ones of a larger budget are combined. A time constant
+/// cannot be kept for them, so those with a time constant count both as constant and as noise.
 const MAX_SINGLE: usize = 58;
-/// The numbers from here on are those of the causes that are carried together, one for each axis.
+/// Numbers from here on are reserved for the combined causes, one for each axis.
 const TOGETHER: u64 = u64::MAX - 5;
 
-/// The error of one frame's pose by a cause that other frames have in common with it.
+/// The error of one frame's pose by a cause that it has in common with other frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LastingError {
-    /// Which cause: the same number in every frame. Numbers of `u64::MAX − 5` and more are taken.
+    /// Identifies the cause: the same number in every frame. Numbers from `u64::MAX − 5` on are reserved.
     pub cause: u64,
     /// Error of the pose that one sigma of the cause makes, in the order of
     /// [`PoseCovariance`](crate::geometry::PoseCovariance).
     pub shift: Vector6<f64>,
-    /// How long the cause lasts (a Gauss–Markov process of first order), s; `None`: for the whole flight.
+    /// Time constant of the cause (a first-order Gauss–Markov process), s; `None`: constant for the whole flight.
     pub time_constant_s: Option<f64>,
 }
 
@@ -52,7 +53,7 @@ struct Column {
     time_constant_s: Option<f64>,
     pose: Vector6<f64>,
     rates: Vector6<f64>,
-    /// Its column of `B`; zero when the frame does not have it.
+    /// Its column of `B`; zero if the frame is not affected.
     shift: Vector6<f64>,
 }
 
@@ -73,7 +74,7 @@ impl Column {
     }
 }
 
-/// The causes of a track. It keeps its memory when it is filled anew.
+/// The causes of a track. Memory is kept when it is refilled.
 #[derive(Debug, PartialEq, Default)]
 pub(super) struct Lasting {
     columns: Vec<Column>,
@@ -92,7 +93,7 @@ impl Clone for Lasting {
 }
 
 impl Lasting {
-    /// Forgets all causes, then takes those of a frame whose pose is the first belief. Returns what [`Self::see`] does.
+    /// Replaces all causes by those of a frame whose pose is the initial state. Returns the same as [`Self::see`].
     pub(super) fn start(&mut self, errors: &[LastingError]) -> Matrix6<f64> {
         self.columns.clear();
         let noise = self.see(errors, &Matrix3::identity());
@@ -102,7 +103,7 @@ impl Lasting {
         noise
     }
 
-    /// Lets time pass. `added` takes what is no longer common to before and after.
+    /// Propagates in time. The variance that is no longer common to before and after goes into `added`.
     pub(super) fn predict(&mut self, dt_s: f64, transition: &Transition, added: &mut Matrix12) {
         for column in &mut self.columns {
             column.pose = transition.of_pose(&column.pose, &column.rates);
@@ -117,15 +118,15 @@ impl Lasting {
         }
     }
 
-    /// Takes the shifts of a frame, whose attitude errors are turned by `turn`. Returns the covariance of those that do
-    /// not last and have no column of their own: they are carried together as constant, and count as noise besides.
+    /// Sets the shifts of a frame, whose attitude errors are rotated by `turn`. Returns the covariance of causes with a
+    /// time constant that have no column of their own: they are combined as constant, and count as noise as well.
     pub(super) fn see(&mut self, errors: &[LastingError], turn: &Matrix3<f64>) -> Matrix6<f64> {
         for column in &mut self.columns {
             column.shift = Vector6::zeros();
         }
         let mut together = Matrix6::zeros();
         let mut noise = Matrix6::zeros();
-        // Frames list their causes in about the same order: the next one is often next.
+        // Frames list their causes in about the same order, so the search starts at the next one.
         let mut hint = 0;
         for error in errors {
             let error = LastingError {
@@ -153,7 +154,7 @@ impl Lasting {
         noise
     }
 
-    /// Takes the covariance of the causes that have no column of their own.
+    /// Sets the covariance of the causes that have no column of their own.
     fn see_together(&mut self, covariance: &Matrix6<f64>) {
         let root = principal_root(covariance);
         for (cause, axis) in (TOGETHER..=u64::MAX).zip(0..6) {
@@ -178,7 +179,7 @@ impl Lasting {
         self.columns.iter().position(is_it)
     }
 
-    /// Returns what innovation and gain need; `None` without causes.
+    /// Returns the sums for innovation and gain; `None` without causes.
     pub(super) fn sums(&self) -> Option<LastingSums> {
         let mut sums = LastingSums {
             seen: Matrix6::zeros(),
@@ -200,7 +201,7 @@ impl Lasting {
         (!self.columns.is_empty()).then_some(sums)
     }
 
-    /// Follows a correction of the motion: `U − K W`.
+    /// Applies a correction of the motion: `U − K W`.
     pub(super) fn correct(&mut self, correction: &Correction) {
         for column in &mut self.columns {
             let seen = column.seen();
@@ -228,7 +229,7 @@ impl Lasting {
     }
 }
 
-/// Adds the outer product of a column of `U` with itself, `times`.
+/// Adds the outer product of a column of `U` with itself, multiplied by `times`.
 fn add_outer(covariance: &mut Matrix12, column: &Column, times: f64) {
     let mut both = Vector12::zeros();
     both.fixed_rows_mut::<6>(0).copy_from(&column.pose);

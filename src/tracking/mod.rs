@@ -1,20 +1,19 @@
-//! A track from poses: single frames have been estimated and judged, here they become one motion.
+//! The track: from poses of single frames, estimated and judged, to one motion.
 //!
-//! Knows `geometry`. Time enters as the images' stamps, whole nanoseconds; nothing here reads a
-//! clock, and the same frames give the same bits. One frame's way:
+//! Depends on `geometry`. Time is the images' stamps in whole nanoseconds; no clock is read, and the same frames give
+//! the same bits. The steps of one frame:
 //!
 //! ```text
-//! pose + noise + lasting errors + stamp -> valid? -> its place among the last half second's frames (history)
-//!   -> predict (model, lasting) -> chi-squared gate -> update -> the later frames again
+//! pose + noise + lasting errors + stamp -> valid? -> inserted into the frames of the last half second (history)
+//!   -> predict (model, lasting) -> chi-squared gate -> update -> the later frames are processed again
 //!   -> enough consistent frames? -> a track
 //! ```
 //!
-//! The state is [`Motion`](crate::geometry::Motion) of the tanker in the camera: pose, velocity and
-//! rate in camera axes, which go on unchanged except for white noise of acceleration (`model`); when
-//! several innovations lean to one side the noise is raised for a while (`lag`). Errors that frames have in common are
-//! consider states (`lasting`). Before
-//! [`FilterSettings::confirm_frames`] consistent frames there is a candidate and no track, and nothing
-//! is given out. [`FilterSettings::max_gap_s`] after the last accepted frame the track is dropped; its [`LastMotion`] can be kept.
+//! The state is the [`Motion`](crate::geometry::Motion) of the tanker in the camera: pose, velocity and rate in camera
+//! axes, constant except for white noise of acceleration (`model`). If several innovations are biased in one direction,
+//! the noise is raised for some time (`lag`). Errors that frames have in common are consider states (`lasting`). Before
+//! [`FilterSettings::confirm_frames`] consistent frames there is a candidate but no track, and nothing is published.
+//! [`FilterSettings::max_gap_s`] after the last accepted frame the track is dropped; its [`LastMotion`] can be kept.
 
 mod belief;
 mod filter;

@@ -1,21 +1,21 @@
-//! The two formulas of the filter: how a motion goes on, and what a measured pose teaches about it.
+//! The formulas of the filter: prediction of a motion, and correction by a measured pose.
 //!
-//! The error is that of [`Motion::covariance`], so position and attitude error stand on the left and
-//! apart. With `Σ` in blocks of six, `A` of the pose, `C` of the rates, `B` between:
+//! The error is that of [`Motion::covariance`], with position and attitude error on the left and separate. With `Σ` in
+//! blocks of six, `A` for the pose, `C` for the rates, `B` for their coupling:
 //!
 //! | step | formula |
 //! |---|---|
 //! | predict | `t + v dt`, `Exp(ω dt) R`; `Φ = diag(I, Exp(ω dt))`, `Γ = dt · diag(I, J(ω dt))` |
 //! | noise | white acceleration of density `q`: `q dt³/3` in `A`, `q dt²/2` in `B`, `q dt` in `C` |
-//! | innovation | `ν = (t_m − t, Log(R_m Rᵀ))`, `S = A + N`, `N` the measurement's covariance seen at `ν` |
-//! | update | Joseph's form, with `I − A S⁻¹` written as `N S⁻¹`: no difference of large numbers |
+//! | innovation | `ν = (t_m − t, Log(R_m Rᵀ))`, `S = A + N`, `N` the measurement's covariance at `ν` |
+//! | update | Joseph form, with `I − A S⁻¹` written as `N S⁻¹`: no difference of large numbers |
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use super::symmetric6::{Factor, rows};
 use crate::geometry::{Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error};
 
-/// Two-sided spectral densities, squared: what each second adds to a variance.
+/// Two-sided spectral densities, squared: the increase of a variance per second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
     /// m²/s³.
@@ -84,7 +84,7 @@ pub(super) fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
 
-/// Returns `diag(I, r) m`: only attitudes turn.
+/// Returns `diag(I, r) m`: only attitudes are rotated.
 fn turn_rows(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
     let turned = r * m.fixed_rows::<3>(3);
     m.fixed_rows_mut::<3>(3).copy_from(&turned);
@@ -98,7 +98,7 @@ fn turn_columns(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
     m
 }
 
-/// Returns `diag(I, r) v`: only attitudes turn.
+/// Returns `diag(I, r) v`: only attitudes are rotated.
 pub(super) fn turned(v: &Vector6<f64>, r: &Matrix3<f64>) -> Vector6<f64> {
     let mut turned = *v;
     turned
@@ -107,7 +107,7 @@ pub(super) fn turned(v: &Vector6<f64>, r: &Matrix3<f64>) -> Vector6<f64> {
     turned
 }
 
-/// How errors of the pose go on: `Φ` and `Γ`.
+/// Propagation of errors of the pose: `Φ` and `Γ`.
 pub(super) struct Transition {
     dt_s: f64,
     turn: UnitQuaternion<f64>,
@@ -127,18 +127,18 @@ impl Transition {
         }
     }
 
-    /// Returns the error of the pose after errors of pose, and of velocity and rate, before.
+    /// Returns the error of the pose after the step, from errors of pose, and of velocity and rate, before it.
     pub(super) fn of_pose(&self, pose: &Vector6<f64>, rates: &Vector6<f64>) -> Vector6<f64> {
         turned(pose, &self.phi) + turned(rates, &self.gamma) * self.dt_s
     }
 }
 
-/// Returns `motion` after `dt_s ≥ 0`.
+/// Returns `motion` predicted by `dt_s ≥ 0`.
 pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
     advance(motion, &Transition::new(motion, dt_s), noise)
 }
 
-/// Returns `motion` after a transition from it.
+/// Returns `motion` after a transition that was made for it.
 pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -> Motion {
     let Transition {
         dt_s,
@@ -161,7 +161,7 @@ pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -
     let mut predicted = *motion;
     predicted.b_from_a = Isometry3::from_parts(
         Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
-        // Products of unit quaternions drift from length one by rounding.
+        // The norm of products of unit quaternions drifts by rounding.
         UnitQuaternion::new_normalize((turn * motion.b_from_a.rotation).into_inner()),
     );
     after.store(&mut predicted);
@@ -169,7 +169,7 @@ pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -
     predicted
 }
 
-/// Adds what white noise of acceleration leaves after `time_s`.
+/// Adds the effect of white noise of acceleration over `time_s`.
 pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
     let covariance = &mut motion.covariance;
     for axis in 0..6 {
@@ -186,8 +186,8 @@ pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
     }
 }
 
-/// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose,
-/// `W = H U + B` what the difference shows of them.
+/// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose, `W = H U
+/// + B` their effect on the innovation.
 pub(super) struct LastingSums {
     /// `W Wᵀ`.
     pub(super) seen: Matrix6<f64>,
@@ -199,18 +199,18 @@ pub(super) struct LastingSums {
     pub(super) seen_shift: Matrix6<f64>,
 }
 
-/// A motion corrected by a measurement, and by what gains.
+/// A corrected motion, with the gains.
 pub(super) struct Correction {
     pub(super) motion: Motion,
     /// `K` of the pose, transposed.
     pub(super) pose_gain_t: Matrix6<f64>,
     /// `K` of velocity and rate, transposed.
     pub(super) rates_gain_t: Matrix6<f64>,
-    /// Turns errors of the attitude to stand about the corrected one.
+    /// Converts errors of the attitude to errors about the corrected one.
     pub(super) reset: Matrix3<f64>,
 }
 
-/// A measured pose held against a prediction.
+/// A measured pose compared with a prediction.
 pub(super) struct Innovation {
     /// `ν`.
     difference: Vector6<f64>,
@@ -218,7 +218,7 @@ pub(super) struct Innovation {
     noise: Matrix6<f64>,
     /// `S⁻¹`.
     inverse: Matrix6<f64>,
-    /// The square root of `S⁻¹`, times `ν`: white and of unit variance when the model is right.
+    /// The square root of `S⁻¹`, times `ν`: white and of unit variance if the model is right.
     pub(super) whitened: Vector6<f64>,
     /// `νᵀ S⁻¹ ν`.
     pub(super) squared: f64,
@@ -228,7 +228,7 @@ pub(super) struct Innovation {
 pub(super) struct Difference {
     /// `ν`.
     by: Vector6<f64>,
-    /// The measurement's own error turns with the attitude between the two: `Log(Exp(n) Exp(φ))`.
+    /// Rotates the measurement's error by the attitude between the two: `Log(Exp(n) Exp(φ))`.
     pub(super) turn: Matrix3<f64>,
 }
 
@@ -243,12 +243,12 @@ impl Difference {
 }
 
 impl Innovation {
-    /// Returns `None` when the covariances are so far apart that their sum has no factor.
+    /// Returns `None` if the covariances differ so much in size that their sum cannot be factored.
     ///
     /// # Inputs
     /// * `covariance`: of the predicted pose, given the lasting causes.
     /// * `noise`: covariance of the measured pose, given the lasting causes.
-    /// * `lasting`: that of the difference by lasting causes; `None` without any.
+    /// * `lasting`: sums over the lasting causes; `None` without any.
     pub(super) fn new(
         difference: &Difference,
         covariance: &PoseCovariance,
@@ -273,15 +273,15 @@ impl Innovation {
         })
     }
 
-    /// Returns the motion corrected by the measurement; `None` when its covariance would not be positive
-    /// definite. Covariances of motions are those given the lasting causes.
+    /// Returns the motion corrected by the measurement; `None` if its covariance would not be positive definite.
+    /// Covariances of motions are those given the lasting causes.
     pub(super) fn correct(
         &self,
         predicted: &Motion,
         lasting: Option<&LastingSums>,
     ) -> Option<Correction> {
         let before = Blocks::of(predicted);
-        // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N; with causes each has its part of them.
+        // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N; with causes their terms are added.
         let mut pose_gain_t = self.inverse * before.pose;
         let mut rates_gain_t = self.inverse * before.cross;
         let mut rest_t = self.inverse * self.noise;
@@ -297,7 +297,7 @@ impl Innovation {
             rates: before.rates - before.cross.transpose() * rates_gain_t,
         };
         if lasting.is_some() {
-            // The gain is not the best one given the causes, so what cancels in the two lines above does not here.
+            // The gain is not optimal given the causes, so terms that cancel in the two lines above do not cancel here.
             let slipped = self.noise * rates_gain_t;
             after.cross += pose_gain_t.tr_mul(&slipped) - rest * (before.pose * rates_gain_t);
             after.rates += rates_gain_t.tr_mul(&(before.pose * rates_gain_t + slipped))
@@ -307,7 +307,7 @@ impl Innovation {
         let pose_step = pose_gain_t.tr_mul(&self.difference);
         let rates_step = rates_gain_t.tr_mul(&self.difference);
         let turn: Vector3<f64> = pose_step.fixed_rows::<3>(3).into_owned();
-        // What is left of the error now stands about the corrected attitude.
+        // The remaining error is now about the corrected attitude.
         let reset = left_jacobian(turn);
         after.pose = turn_columns(turn_rows(after.pose, &reset), &reset);
         after.cross = turn_rows(after.cross, &reset);

@@ -1,96 +1,95 @@
-//! What became of one frame in the track, and why a track gives no prediction.
+//! The effect of one frame on the track, and why there is no prediction.
 
 use std::fmt;
 
-/// What one frame did to the track.
+/// The effect of one frame on the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum TrackOutcome {
-    /// It is the first of a candidate; there is no track.
+    /// The frame is the first of a candidate; there is no track.
     Started(StartReason),
-    /// It agrees with the candidate, which needs more such frames; there is no track.
+    /// The frame agrees with the candidate, which needs more such frames; there is no track.
     Confirming {
         /// Consistent frames so far, this one included.
         consistent_frames: u32,
         /// Frames needed.
         needed: u32,
     },
-    /// It was the last one that the candidate needed: from here on there is a track. If there was one before,
-    /// the last frames have contradicted it and agreed with each other.
+    /// The frame confirms the candidate: there is a track from here on. If there was one before, the last frames have
+    /// contradicted it and agreed with each other.
     Acquired,
-    /// It agrees with the track and has corrected it.
+    /// The frame agrees with the track and has corrected it.
     Updated {
         /// Squared innovation over its covariance, chi-squared with 6 degrees of freedom.
         innovation_squared: f64,
     },
-    /// It contradicts the track and has not touched it.
+    /// The frame contradicts the track and was not used.
     Gated {
-        /// The same number.
+        /// Squared innovation over its covariance.
         innovation_squared: f64,
-        /// The largest to accept.
+        /// The largest that is accepted.
         limit: f64,
     },
-    /// A frame of this stamp has been seen: not used again.
+    /// A frame with this stamp was already processed: not used again.
     Duplicate {
         /// Its stamp, ns.
         stamp_ns: i64,
     },
-    /// Its image was taken before that of a frame that has come already, and it was taken at its own time: the track is
-    /// as if it had come in order.
+    /// The frame is older than one that has already been processed, and was inserted at its own time: the track is the
+    /// same as if the frames had come in order.
     Inserted {
         /// Behind the newest frame, s.
         late_by_s: f64,
-        /// Whether it has corrected the track: it has a pose, which does not contradict the track of that time.
+        /// Whether it corrected the track: it has a pose that does not contradict the track at that time.
         was_used: bool,
     },
-    /// Its image was taken so long before that of the last accepted frame that it cannot be used any more.
+    /// The frame is so much older than the last accepted frame that it can no longer be used.
     Late {
         /// By this much, s.
         late_by_s: f64,
     },
-    /// Its pose or covariance is not one.
+    /// The pose or its covariance is invalid.
     Invalid(MeasurementError),
-    /// A frame without a pose: the track goes on by prediction.
+    /// A frame without a pose: the track is predicted.
     Coasting {
         /// Since the last accepted frame, s.
         gap_s: f64,
     },
-    /// A frame without a pose, longer than `max_gap_s` after the last accepted one, or as long before it: the
-    /// track is dropped.
+    /// A frame without a pose, longer than `max_gap_s` after the last accepted one, or as long before it: the track is
+    /// dropped.
     Dropped {
-        /// Since the last accepted frame, s; negative when stamps went back.
+        /// Since the last accepted frame, s; negative if stamps went back.
         gap_s: f64,
     },
-    /// A frame without a pose, and no track or candidate to go on.
+    /// A frame without a pose, while there is neither a track nor a candidate.
     Idle,
 }
 
-/// Why a candidate begins with this frame. Whatever there was before is dropped.
+/// Why a candidate begins with this frame. Any previous one is dropped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum StartReason {
     /// There was neither a track nor a candidate.
     First,
-    /// The last accepted frame is longer ago than `max_gap_s`.
+    /// The last accepted frame is more than `max_gap_s` ago.
     Gap {
         /// s.
         gap_s: f64,
     },
-    /// Its stamp is older than the last accepted one by more than `max_gap_s`: the source of the stamps
-    /// has begun anew.
+    /// Its stamp is more than `max_gap_s` before the last accepted one: the source of the stamps has restarted.
     StampsWentBack {
         /// s.
         by_s: f64,
     },
-    /// It contradicts the candidate so far.
+    /// It contradicts the candidate.
     Inconsistent {
         /// Squared innovation over its covariance.
         innovation_squared: f64,
-        /// The largest to accept.
+        /// The largest that is accepted.
         limit: f64,
     },
-    /// The covariance of the track was no longer positive definite; seen only with points a kilometre from the
-    /// tanker's origin and sigmas of nanometres beside such of kilometres.
+    /// The covariance of the track was no longer positive definite. Seen only with points a kilometre from the tanker's
+    /// origin and sigmas of nanometres together with sigmas of kilometres.
     LostPrecision,
 }
 
@@ -113,7 +112,9 @@ impl fmt::Display for TrackOutcome {
                 f,
                 "expected a squared innovation of at most {limit:.1}, got {innovation_squared:.1}: not used"
             ),
-            Self::Duplicate { .. } => write!(f, "a stamp that has been seen: not used"),
+            Self::Duplicate { .. } => {
+                write!(f, "a frame with this stamp was already processed: not used")
+            }
             Self::Inserted {
                 late_by_s,
                 was_used: true,
@@ -121,7 +122,7 @@ impl fmt::Display for TrackOutcome {
             Self::Inserted { late_by_s, .. } => {
                 write!(
                     f,
-                    "late by {late_by_s:.3} s: nothing to use at its own time"
+                    "late by {late_by_s:.3} s: no usable pose at its own time"
                 )
             }
             Self::Late { late_by_s } => write!(f, "late by {late_by_s:.3} s: not used"),
@@ -136,7 +137,7 @@ impl fmt::Display for TrackOutcome {
 impl fmt::Display for StartReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::First => write!(f, "there was none"),
+            Self::First => write!(f, "there was no track"),
             Self::Gap { gap_s } => write!(f, "the last one ended {gap_s:.3} s ago"),
             Self::StampsWentBack { by_s } => write!(f, "stamps went back by {by_s:.3} s"),
             Self::Inconsistent {
@@ -153,18 +154,20 @@ impl fmt::Display for StartReason {
     }
 }
 
-/// Why a pose is no measurement.
+/// Why a pose cannot be used as a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasurementError {
     /// The pose is not finite.
     #[error("expected a finite pose, got one with NaN or infinity")]
     PoseNotFinite,
-    /// The covariance is not one.
-    #[error("expected a finite, symmetric, positive definite covariance, got none")]
+    /// The covariance is invalid.
+    #[error("expected a finite, symmetric, positive definite covariance, got another matrix")]
     InvalidCovariance,
-    /// A lasting error is not one.
-    #[error("expected finite shifts and positive time constants of lasting errors, got others")]
+    /// A lasting error is invalid.
+    #[error(
+        "expected finite shifts and positive time constants of lasting errors, got other values"
+    )]
     InvalidLastingError,
 }
 
@@ -172,16 +175,16 @@ pub enum MeasurementError {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PredictError {
-    /// Nothing to predict from.
-    #[error("expected a track, there is none yet or it was dropped")]
+    /// There is no track to predict.
+    #[error("expected a track, but none is confirmed yet or it was dropped")]
     NoTrack,
-    /// Before the track's own stamp.
+    /// Before the stamp of the track.
     #[error("expected a stamp at or after that of the track, got one {by_s:.3} s before it")]
     BeforeTrack {
         /// s.
         by_s: f64,
     },
-    /// So far ahead that the track is to be dropped.
+    /// So far ahead that the track would be dropped.
     #[error("expected a stamp at most {limit_s} s after the last accepted frame, got {gap_s:.3} s")]
     BeyondGap {
         /// s.

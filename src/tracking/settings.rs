@@ -1,20 +1,20 @@
-//! What the filter is told about flight, and the check of it.
+//! Settings of the filter, and their check.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::model::Noise;
 
-/// Probability with which a track that follows well is not taken for one that lags, per frame. The
-/// price of a false alarm is small, a noisier velocity for some seconds.
+/// Probability per frame that a track that does not lag is not reported as lagging. A false alarm costs little: a
+/// noisier velocity for some seconds.
 const LAG_PROBABILITY: f64 = 0.9999;
 
-/// How the tanker may move against the camera, and when to believe it.
+/// Assumed motion of the tanker relative to the camera, and criteria for a track.
 ///
-/// The two densities say how fast velocity and rate become unknown: without detections a standard
-/// deviation grows as `density · √t`, so 0.2 m/s²/√Hz adds 0.2 m/s in one second, 0.4 m/s in four. An
-/// acceleration of standard deviation `a` that lasts for a time `τ` before it changes has the density
-/// `a √(2 τ)`. Too small a density makes the track lag in a manoeuvre and claim too much; too large a
-/// one only makes it noisier, so doubt is settled upwards.
+/// The two densities are the growth of the uncertainty of velocity and rate: without detections a standard deviation
+/// grows as `density · √t`, so 0.2 m/s²/√Hz adds 0.2 m/s in one second, 0.4 m/s in four. An acceleration of standard
+/// deviation `a` that lasts for a time `τ` before it changes has the density `a √(2 τ)`. With too small a density the
+/// track lags in a manoeuvre and is overconfident; with too large a one it is only noisier, so choose the larger if in
+/// doubt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilterSettings {
     /// Spectral density of the relative acceleration on each axis, m/s²/√Hz.
@@ -23,24 +23,24 @@ pub struct FilterSettings {
     pub angular_acceleration_density_dps2: f64,
     /// Both densities are multiplied by this while the innovations show that the track lags; 1: never.
     pub manoeuvre_factor: f64,
-    /// Standard deviation of the relative velocity on each axis before it was ever seen, m/s.
+    /// Standard deviation of the relative velocity on each axis when a track begins, m/s.
     pub initial_speed_sigma_mps: f64,
-    /// Standard deviation of the relative rate on each axis before it was ever seen, deg/s.
+    /// Standard deviation of the relative rate on each axis when a track begins, deg/s.
     pub initial_rate_sigma_dps: f64,
-    /// Added to the variance of each measured position axis: what calibration and map hide, m.
+    /// Added to the variance of each measured position axis, for unmodelled errors of calibration and map, m.
     pub position_floor_m: f64,
     /// Added to the variance of each measured attitude axis, degrees.
     pub attitude_floor_deg: f64,
-    /// Probability with which a correct frame passes the gate.
+    /// Probability that a correct frame passes the gate.
     pub gate_probability: f64,
     /// The track is dropped this long after the last accepted frame, s.
     pub max_gap_s: f64,
-    /// Consistent frames that make a candidate a track, the first one included.
+    /// Consistent frames that confirm a candidate, including the first.
     pub confirm_frames: u32,
 }
 
 impl Default for FilterSettings {
-    /// A receiver that keeps station or closes slowly, in the air behind a tanker.
+    /// For a receiver that keeps station or closes slowly behind a tanker.
     fn default() -> Self {
         Self {
             acceleration_density_mps2: 0.15,
@@ -71,7 +71,7 @@ pub struct FilterSettingsError {
     pub got: f64,
 }
 
-/// Settings that passed their check: what a [`Filter`](super::Filter) is made of.
+/// Settings that passed their check, from which a [`Filter`](super::Filter) is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CheckedFilterSettings {
     settings: FilterSettings,
@@ -79,7 +79,7 @@ pub struct CheckedFilterSettings {
 }
 
 impl CheckedFilterSettings {
-    /// Returns the settings as they were given.
+    /// Returns the original settings.
     #[must_use]
     pub const fn settings(&self) -> &FilterSettings {
         &self.settings
@@ -91,7 +91,7 @@ impl CheckedFilterSettings {
 pub(super) struct Checked {
     pub(super) noise: Noise,
     pub(super) manoeuvre_noise: Noise,
-    /// Of the squared fading mean of the innovations.
+    /// Limit of the squared fading mean of the innovations.
     pub(super) lag_limit: f64,
     /// (m/s)².
     pub(super) initial_speed_variance: f64,
@@ -101,7 +101,7 @@ pub(super) struct Checked {
     pub(super) position_floor_variance: f64,
     /// rad².
     pub(super) attitude_floor_variance: f64,
-    /// Of the squared innovation.
+    /// Limit of the squared innovation.
     pub(super) gate: f64,
     pub(super) max_gap_s: f64,
     pub(super) confirm_frames: u32,
@@ -119,9 +119,9 @@ impl FilterSettings {
         })
     }
 
-    /// Returns the settings as the filter uses them.
+    /// Returns the settings in the units of the filter.
     ///
-    /// The ranges keep the ratio of the largest to the smallest variance far from what doubles resolve.
+    /// The ranges keep the ratio of the largest to the smallest variance well within the resolution of doubles.
     fn check(&self) -> Result<Checked, FilterSettingsError> {
         let within = |name, got: f64, least: f64, most: f64| {
             if (least..=most).contains(&got) {

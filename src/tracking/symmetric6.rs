@@ -1,16 +1,16 @@
-//! Symmetric 6×6 matrices, factored as `L D Lᵀ` without a loop that the compiler cannot unroll.
+//! Symmetric 6×6 matrices, factored as `L D Lᵀ` with loops that the compiler can unroll.
 
 use nalgebra::Matrix6;
 
 type Vector = [f64; 6];
 
-/// Pivots below this share of their diagonal entry mean a direction that the points leave free.
+/// A pivot below this share of its diagonal entry means that the points leave a direction undetermined.
 const MIN_PIVOT_SHARE: f64 = 1e-13;
 
-/// Returns a symmetric matrix as [`Factor::new`] takes it.
+/// Returns a symmetric matrix in the form that [`Factor::new`] takes.
 #[inline]
 pub(super) fn rows(m: &Matrix6<f64>) -> [[f64; 6]; 6] {
-    // Columns for rows: the same numbers, and no transposition.
+    // Columns instead of rows: the same numbers, without a transposition.
     m.data.0
 }
 
@@ -22,14 +22,14 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Returns the factors of a symmetric matrix, of which the lower triangle is read; `None` unless it
-    /// is positive definite, and far enough from singular for its inverse to mean something.
+    /// Returns the factors of a symmetric matrix, of which the lower triangle is read; `None` unless it is positive
+    /// definite and well enough conditioned for its inverse to be meaningful.
     #[inline(always)]
     pub(super) fn new(a: &[[f64; 6]; 6]) -> Option<Self> {
         let mut l = [[0.0; 6]; 6];
         let mut inverse_d = [0.0; 6];
         for j in 0..6 {
-            // Row j of L D, kept beside L.
+            // Row j of L D, kept in addition to L.
             let mut ld = [0.0; 6];
             let mut pivot = a[j][j];
             for k in 0..j {
@@ -43,7 +43,7 @@ impl Factor {
             }
             inverse_d[j] = 1.0 / pivot;
             for i in j + 1..6 {
-                // `l[i][..j]` already holds `L D`; it is divided by `D` in its own turn.
+                // `l[i][..j]` already holds `L D`; it is divided by `D` later.
                 let mut value = a[i][j];
                 for k in 0..j {
                     value -= l[i][k] * l[j][k];
@@ -57,7 +57,7 @@ impl Factor {
             .then_some(Self { l, inverse_d })
     }
 
-    /// Returns `D^(−½) L⁻¹ b`: white and of unit variance when `A` is the covariance of `b`.
+    /// Returns `D^(−½) L⁻¹ b`: white and of unit variance if `A` is the covariance of `b`.
     #[inline]
     pub(super) fn whiten(&self, b: &Vector) -> Vector {
         let mut x = *b;

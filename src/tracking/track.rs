@@ -1,4 +1,4 @@
-//! The motion at one image's time, and differences of times.
+//! The motion at the time of an image, and differences of times.
 
 use crate::geometry::Motion;
 
@@ -11,10 +11,10 @@ pub struct Track {
     pub motion: Motion,
 }
 
-/// Returns `later − earlier`; whole nanoseconds, so that no clock's epoch costs precision.
+/// Returns `later − earlier`. Whole nanoseconds, so that the epoch of the clock does not cost precision.
 pub(super) fn seconds(later_ns: i64, earlier_ns: i64) -> f64 {
-    // In 128 bits the difference of any two stamps exists.
+    // In 128 bits, where the difference of any two stamps is representable.
     let nanoseconds = i128::from(later_ns) - i128::from(earlier_ns);
-    // Divided, not multiplied: ten seconds are then exactly ten.
+    // Divided rather than multiplied: ten seconds are then exactly ten.
     nanoseconds as f64 / 1e9
 }

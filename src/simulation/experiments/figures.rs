@@ -10,9 +10,9 @@ use crate::target::Marker;
 const BEST_METHODS: &[Method] = &[Method::NominalIterated, Method::MaximumLikelihood];
 
 impl Experiment {
-    /// Fig. 5: six to fourteen points, the added ones evenly along the fin, or in pairs along both wings or
-    /// both tail planes from root to tip. The fin's foot is taken at the height of the tail planes below
-    /// its top, the root of the others halfway between the tips.
+    /// Fig. 5: six to fourteen points, the added ones evenly along the fin, or in pairs along both wings or both tail
+    /// planes from root to tip. The fin's foot is assumed at the height of the tail planes below its top, the root of
+    /// the others halfway between the tips.
     #[must_use]
     pub fn number_of_points() -> Self {
         let paper = paper_markers("paper");

@@ -1,6 +1,6 @@
-//! The experiments of the paper's section 4 as lists of settings; what each leaves open is decided here.
+//! The experiments of the paper's section 4 as lists of settings, with assumptions for what the paper leaves open.
 //!
-//! Knows no generator and no thread: a caller runs the trials of each [`Setting`] in any order.
+//! Contains no random generator and no thread: the caller runs the trials of each [`Setting`] in any order.
 
 mod figures;
 mod tables;
@@ -11,7 +11,7 @@ use super::trial::{Method, Stop};
 use super::{Scene, paper_camera, pose_in_camera};
 use crate::target::{Marker, MarkerMap};
 
-/// px; where the paper says "the same noise" without a number.
+/// px; used where the paper writes "the same noise" without a number.
 const SIGMA_PX: f64 = 0.5;
 
 /// A figure or a table: settings along one abscissa, in one or several series.
@@ -19,15 +19,15 @@ const SIGMA_PX: f64 = 0.5;
 pub struct Experiment {
     /// Its name in files and on the command line.
     pub name: &'static str,
-    /// What it shows.
+    /// Its title.
     pub title: &'static str,
-    /// Number of its random streams, different from every other experiment's.
+    /// Number of its random streams, unique among the experiments.
     pub stream: u16,
     /// Name of the abscissa, with its unit.
     pub abscissa: &'static str,
-    /// Which methods it compares.
+    /// The methods that it compares.
     pub methods: &'static [Method],
-    /// Trials for each that the caller asked for: rare events need more.
+    /// Multiplies the number of trials that the caller asks for: rare events need more.
     pub trials_factor: u32,
     /// Series by series, abscissa ascending.
     pub settings: Vec<Setting>,
@@ -38,7 +38,7 @@ pub struct Experiment {
 pub struct Setting {
     /// Name of its series.
     pub series: String,
-    /// Its place on the abscissa.
+    /// Its abscissa.
     pub abscissa: f64,
     /// Markers, camera, true pose.
     pub scene: Scene,
@@ -59,8 +59,8 @@ impl Setting {
         }
     }
 
-    /// Returns how many markers lie inside the paper's image. The trials use all of them, also those
-    /// outside: the paper states no image size.
+    /// Returns how many markers are inside the paper's image. The trials use all of them, because the paper states no
+    /// image size.
     #[must_use]
     pub fn markers_in_image(&self) -> usize {
         let size = self.scene.camera().image_size_px();

@@ -1,10 +1,10 @@
-//! What explains the figures: failures, wrong minima, and how fast the iteration settles.
+//! Explanations of the figures: failures, wrong minima, and the convergence of the iteration.
 
 use super::{Experiment, SIGMA_PX, Setting, paper_markers, pose_41, pose_42, scene};
 use crate::simulation::{Method, Stop};
 use crate::target::MarkerMap;
 
-/// The two starts of the iteration.
+/// The two initialisations of the iteration.
 const ITERATED_METHODS: &[Method] = &[Method::LinearIterated, Method::NominalIterated];
 
 impl Experiment {
@@ -32,8 +32,7 @@ impl Experiment {
         }
     }
 
-    /// How many steps the iteration takes until it turns by less than a tolerance, and until it is so near
-    /// to its end.
+    /// Number of steps until the iteration turns by less than a tolerance, and until it is within that of its end.
     #[must_use]
     pub fn iterations() -> Self {
         let settings = MarkerMap::shipped_names()
@@ -64,7 +63,7 @@ impl Experiment {
         }
     }
 
-    /// What an iteration is worth that is stopped after few steps.
+    /// Accuracy of an iteration that is stopped after few steps.
     #[must_use]
     pub fn stopped() -> Self {
         let settings = [0.25, 0.5, 1.0]
