@@ -186,8 +186,8 @@ pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
     }
 }
 
-/// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose, `W = H U
-/// + B` their effect on the innovation.
+/// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose,
+/// `W = H U + B` their effect on the innovation.
 pub(super) struct LastingSums {
     /// `W Wᵀ`.
     pub(super) seen: Matrix6<f64>,

@@ -1,8 +1,8 @@
 //! Sums over points that couple modes to the pose and to each other, and the elimination of the modes.
 //!
 //! With `W` the inverse covariance of the noise of single points, `H` the modes and `J` the derivative by the pose, the
-//! amplitudes have the normal equations `A = 1 + HᵀWH`, with the coupling `C = JᵀWH` to the pose. Then `JᵀΣ⁻¹J = JᵀWJ −
-//! C A⁻¹ Cᵀ`, and likewise for gradient and chi-squared (Woodbury's identity).
+//! amplitudes have the normal equations `A = 1 + HᵀWH`, with the coupling `C = JᵀWH` to the pose. Then
+//! `JᵀΣ⁻¹J = JᵀWJ − C A⁻¹ Cᵀ`, and likewise for gradient and chi-squared (Woodbury's identity).
 
 use crate::estimation::lanes::four::{Arithmetic, Four, Number, totals};
 use crate::estimation::lanes::information::{Information, Vector};

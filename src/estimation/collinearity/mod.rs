@@ -1,8 +1,8 @@
 //! The object-space error of all points as one quadratic form in the rotation alone.
 //!
 //! With `q = R p + c` the camera coordinates of a marker, `p` relative to the markers' mean, and one weight matrix `W`
-//! per point whose null space is the point's ray, the error is `Σ qᵀ W q`. Its minimum over `c` is in closed form, `c =
-//! T r` with `r = vec(R)` (column-major), which leaves `E(R) = rᵀ Ω r`: a 9×9 matrix, computed once per frame. The
+//! per point whose null space is the point's ray, the error is `Σ qᵀ W q`. Its minimum over `c` is in closed form,
+//! `c = T r` with `r = vec(R)` (column-major), which leaves `E(R) = rᵀ Ω r`: a 9×9 matrix, computed once per frame. The
 //! iterations then do not access the points.
 //!
 //! | paper           | here                                     |
