@@ -16,6 +16,8 @@ mod calibration;
 mod distortion;
 mod error;
 mod file;
+mod from_info;
+mod image;
 mod info;
 mod model;
 #[cfg(test)]
@@ -25,5 +27,6 @@ pub use budget_file::{CalibrationBudget, CalibrationBudgetError};
 pub use calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};
 pub use error::{CameraError, UndistortError};
 pub use file::{CameraFileError, CameraFileWarning};
-pub use info::{CameraInfo, OffCentre, RegionOfInterest};
+pub use image::OffCentre;
+pub use info::{CameraInfo, RegionOfInterest};
 pub use model::{Camera, Pixel, Ray};
