@@ -1,14 +1,17 @@
 //! The estimator: from observations to a pose with the numbers to judge it by.
 
-use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion};
+mod leave_out;
+
+use nalgebra::{Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
 use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses};
-use super::exclude::{self, Found, Suspects};
+use super::exclude::Found;
 use super::initialise::{self, linear_rotation};
 use super::lanes::points::{INLINE_POINTS, mean};
 use super::problem::{NEGLIGIBLE, Problem, Room};
+use super::redundancy::{count_checking, with_sigma_floor};
 use super::refine::Fit;
 use super::trust::TrustLimits;
 use super::widen::honest_covariance;
@@ -17,15 +20,6 @@ use super::{
 };
 use crate::camera::{Camera, Ray};
 
-/// rad; a subset whose pose is turned farther from its prior than this fits noise.
-const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
-
-/// Points whose sigma is more than this ratio above that of the better ones do not check them.
-const WEAK_SIGMA_RATIO: f64 = 5.0;
-/// Points whose sigma is more than this ratio below the others' cannot be checked by them.
-const BOLD_SIGMA_RATIO: f64 = 2.0;
-/// From this many `min_points` on, the checks of sigmas apply. With four points most errors go undetected in any case.
-const CHECKED_FROM: usize = 5;
 /// rad; standard deviation of the attitude about its prior: refuelling keeps the relative angles within ±5°.
 pub(crate) const PRIOR_SIGMA: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
@@ -184,36 +178,6 @@ impl Estimator {
         estimate
     }
 
-    /// Searches for the smallest set of points whose exclusion makes the rest pass the test.
-    #[cold]
-    fn leave_out(
-        &self,
-        camera: &Camera,
-        observations: &[Observation],
-        previous: Option<&Rotation3<f64>>,
-        of_all: Option<&Solution>,
-    ) -> Found {
-        let suspects = self.suspects(camera, observations, of_all, previous);
-        let judge = exclude::Judge {
-            solve: |points: &[Observation]| {
-                self.check_count(points)?;
-                self.estimate_with_all(camera, points, previous)
-            },
-            prior_cost: |solution: &Solution| self.prior_cost(solution, previous),
-            min_remaining: match self.settings.initialisation {
-                Initialisation::Nominal | Initialisation::Previous => {
-                    exclude::MIN_REMAINING_WITH_PRIOR
-                }
-                Initialisation::Dlt | Initialisation::Global => {
-                    exclude::MIN_REMAINING_WITHOUT_PRIOR
-                }
-            },
-            // The last attitude may be wrong; the nominal one is stated by the user.
-            is_prior_sure: self.settings.initialisation != Initialisation::Previous,
-        };
-        exclude::search(&judge, observations, &suspects, self.settings.max_outliers)
-    }
-
     /// Checks that there are enough points, and enough of similar precision to check each other.
     #[inline]
     fn check_count(&self, observations: &[Observation]) -> Result<(), EstimateError> {
@@ -290,60 +254,6 @@ impl Estimator {
             }
             (Initialisation::Global, _) => self.solve_globally(problem),
         }
-    }
-
-    /// Returns the cost of the prior for a hypothesis about wrong points: infinite beyond [`MAX_TURN_FROM_PRIOR`], 0
-    /// for initialisations without a prior.
-    fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {
-        let prior = match solution.initialisation {
-            Initialisation::Nominal => Some(&self.settings.nominal_camera_from_tanker),
-            Initialisation::Previous => previous,
-            Initialisation::Dlt | Initialisation::Global => None,
-        };
-        let cost = squared_turn(
-            &solution.camera_from_tanker.rotation.to_rotation_matrix(),
-            prior,
-        );
-        if cost > (MAX_TURN_FROM_PRIOR / PRIOR_SIGMA).powi(2) {
-            f64::INFINITY
-        } else {
-            cost
-        }
-    }
-
-    /// Indices of the points that may be excluded: all if they are few, otherwise those that fit worst. Without a
-    /// solution the fit is judged at the expected attitude, at the position that suits the points best.
-    fn suspects(
-        &self,
-        camera: &Camera,
-        observations: &[Observation],
-        of_all: Option<&Solution>,
-        previous: Option<&Rotation3<f64>>,
-    ) -> Suspects {
-        let most = exclude::max_suspects(observations.len());
-        let count = observations.len();
-        let pose = of_all
-            .map(|solution| solution.camera_from_tanker)
-            .or_else(|| {
-                let expected = previous.unwrap_or(&self.settings.nominal_camera_from_tanker);
-                (count > most).then(|| expected_pose(camera, observations, expected))?
-            });
-        let mut all: SmallVec<[(f64, usize); INLINE_POINTS]> = observations
-            .iter()
-            .enumerate()
-            .map(|(index, seen)| {
-                let residual = pose.and_then(|pose| seen.residual_px(camera, &pose));
-                (
-                    residual.map_or(f64::INFINITY, |r| r.norm() / seen.sigma_px),
-                    index,
-                )
-            })
-            .collect();
-        all.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        all.truncate(most);
-        let mut suspects: Suspects = all.into_iter().map(|(_, index)| index).collect();
-        suspects.sort_unstable();
-        suspects
     }
 
     fn solve_from(
@@ -443,78 +353,6 @@ fn squared_turn(found: &Rotation3<f64>, prior: Option<&Rotation3<f64>>) -> f64 {
         let turn = UnitQuaternion::from_rotation_matrix(&(found * prior.inverse())).angle();
         (turn / PRIOR_SIGMA).powi(2)
     })
-}
-
-/// Returns the pose with a given attitude that fits the points best; `None` if their rays do not determine a position.
-fn expected_pose(
-    camera: &Camera,
-    observations: &[Observation],
-    attitude: &Rotation3<f64>,
-) -> Option<Isometry3<f64>> {
-    let mut room = Room::new();
-    let refinement = Refinement::MaximumLikelihood;
-    let problem = Problem::new(camera, refinement, observations, &mut room).ok()?;
-    Some(problem.pose(&problem.placed(attitude)))
-}
-
-/// Returns the points with sigmas raised to a floor, or `None` if no sigma is below it. The floor is the `of_count`-th
-/// smallest sigma over [`BOLD_SIGMA_RATIO`]. Without it, two points with much smaller sigmas than the rest would
-/// dominate the pose, and the other points could not reveal an error of theirs.
-fn with_sigma_floor(
-    observations: &[Observation],
-    of_count: usize,
-) -> Option<SmallVec<[Observation; INLINE_POINTS]>> {
-    if of_count < CHECKED_FROM || are_alike(observations, BOLD_SIGMA_RATIO) {
-        return None;
-    }
-    let mut sigmas: SmallVec<[f64; INLINE_POINTS]> =
-        observations.iter().map(|seen| seen.sigma_px).collect();
-    sigmas.sort_unstable_by(f64::total_cmp);
-    let floor_px = sigmas.get(of_count - 1)? / BOLD_SIGMA_RATIO;
-    (sigmas[0] < floor_px).then(|| {
-        observations
-            .iter()
-            .map(|seen| Observation {
-                sigma_px: seen.sigma_px.max(floor_px),
-                ..*seen
-            })
-            .collect()
-    })
-}
-
-/// Returns whether no sigma is more than `ratio` times another, which is the usual case.
-fn are_alike(observations: &[Observation], ratio: f64) -> bool {
-    let Some(first) = observations.first() else {
-        return true;
-    };
-    // Within √ratio of the first implies within the ratio of each other.
-    let (least, largest) = (first.sigma_px / ratio.sqrt(), first.sigma_px * ratio.sqrt());
-    let is_near = |seen: &Observation| seen.sigma_px >= least && seen.sigma_px <= largest;
-    observations.iter().all(is_near) || {
-        let sigmas = observations.iter().map(|seen| seen.sigma_px);
-        let least = sigmas.clone().fold(f64::INFINITY, f64::min);
-        sigmas.fold(0.0, f64::max) <= ratio * least
-    }
-}
-
-/// Returns how many points are precise enough to check others: those whose sigma is at most [`WEAK_SIGMA_RATIO`] times
-/// the third smallest. Any three points determine a pose; much weaker points could not contradict them and add no
-/// redundancy.
-fn count_checking(observations: &[Observation]) -> usize {
-    if are_alike(observations, WEAK_SIGMA_RATIO) {
-        return observations.len();
-    }
-    let mut best = [f64::INFINITY; 3];
-    for seen in observations {
-        if let Some(place) = best.iter().position(|sigma| seen.sigma_px < *sigma) {
-            best[place..].rotate_right(1);
-            best[place] = seen.sigma_px;
-        }
-    }
-    observations
-        .iter()
-        .filter(|seen| seen.sigma_px <= WEAK_SIGMA_RATIO * best[2])
-        .count()
 }
 
 fn dlt_seed(

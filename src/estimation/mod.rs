@@ -28,6 +28,7 @@ mod lanes;
 mod newton;
 mod orthogonal_iteration;
 mod problem;
+mod redundancy;
 mod refine;
 mod residuals;
 mod trust;
