@@ -1,9 +1,10 @@
 //! Detects what is wrong around the node, logs when it begins and ends, and shows it in `/diagnostics` in between.
 //!
-//! `watch` detects faults, `faults` keeps and logs them. `stamp_age` checks stamps, `residuals` frames that disagree and
+//! `watch` detects faults, `arrivals` silent topics, `faults` keeps and logs them. `stamp_age` checks stamps, `residuals` frames that disagree and
 //! sigmas, `attitude` mount and nominal attitude; `latency` keeps quantiles. Time is an argument, so that tests need no
 //! clock.
 
+mod arrivals;
 mod attitude;
 mod faults;
 mod latency;

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::UnitQuaternion;
 
+use super::arrivals::{Arrivals, SILENCE, is_long};
 use super::{
     Attitude, ClockSilence, Fault, Faults, ImageAge, Jumps, Latency, Residuals, StampAge,
     Unexpected,
@@ -14,10 +15,6 @@ use crate::refuelling::ExpectedAttitude;
 use crate::ros::graph::{Graph, Misfit};
 use crate::ros::messages::Time;
 
-/// Longer than a reliable publisher on Fast DDS may take for its first sample: 3 s, its heartbeat's period.
-const SILENCE: Duration = Duration::from_secs(5);
-/// Camera info counts as steady after this many consecutive seconds with one in each; a latched one never does.
-const STEADY_S: u32 = 3;
 /// How long detections may arrive before the first camera info.
 const GRACE: Duration = Duration::from_secs(2);
 /// Missing detections are logged after this long.
@@ -26,62 +23,6 @@ const WAIT: Duration = Duration::from_secs(3);
 const BETWEEN_SIGMAS: Duration = Duration::from_millis(200);
 /// Limit of endpoints that are named; a foreign graph may have any number.
 const MOST_MISFITS: usize = 16;
-
-/// What arrives on a topic.
-#[derive(Debug, Default)]
-struct Arrivals {
-    last: Option<Instant>,
-    this_second: bool,
-    steady_s: u32,
-    was_steady: bool,
-    /// Since when the topic has had a matching publisher.
-    heard_since: Option<Instant>,
-}
-
-impl Arrivals {
-    fn take(&mut self, now: Instant) {
-        self.last = Some(now);
-        self.this_second = true;
-    }
-
-    fn on_second(&mut self, publishers: usize, now: Instant) {
-        if publishers > 0 && self.heard_since.is_none() {
-            // A restarted publisher may send camera info only once.
-            self.steady_s = 0;
-            self.was_steady = false;
-        }
-        self.steady_s = if self.this_second {
-            self.steady_s.saturating_add(1)
-        } else {
-            0
-        };
-        self.was_steady |= self.steady_s >= STEADY_S;
-        self.this_second = false;
-        self.heard_since = if publishers == 0 {
-            None
-        } else {
-            self.heard_since.or(Some(now))
-        };
-    }
-
-    fn ever(&self) -> bool {
-        self.last.is_some()
-    }
-
-    /// Whether the last one arrived recently.
-    fn recent(&self, now: Instant) -> bool {
-        self.last.is_some_and(|last| !is_long(last, now))
-    }
-
-    /// Whether the topic has had a publisher for a while, but no message arrives.
-    fn silent(&self, now: Instant) -> bool {
-        self.heard_since.is_some_and(|since| is_long(since, now)) && !self.recent(now)
-    }
-}
-
-fn is_long(since: Instant, now: Instant) -> bool {
-    now.saturating_duration_since(since) >= SILENCE
-}
 
 /// State of graph and clocks, once a second.
 pub struct Second<'a> {
@@ -447,144 +388,4 @@ impl Watch {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A watch with its own seconds.
-    struct Scene {
-        watch: Watch,
-        graph: Graph,
-        clock: Option<ClockSilence>,
-        now: Instant,
-    }
-
-    impl Scene {
-        fn new() -> Self {
-            let now = Instant::now();
-            Self {
-                watch: Watch::new("/points".into(), "/camera".into(), now),
-                graph: Graph::default(),
-                clock: None,
-                now,
-            }
-        }
-
-        fn publishers(&mut self, topic: &str, count: usize) {
-            self.graph.heard.insert(topic.to_owned(), count);
-        }
-
-        /// Lets seconds pass, in each of which these arrive.
-        fn pass(&mut self, seconds: u64, detections: bool, camera: bool) -> Vec<Fault> {
-            for _ in 0..seconds {
-                self.now += Duration::from_secs(1);
-                if detections {
-                    self.watch.on_detections(self.now);
-                }
-                if camera {
-                    self.watch.on_camera_info(self.now);
-                }
-                let second = Second {
-                    graph: &self.graph,
-                    clock_jump: None,
-                    system_clock: None,
-                    clock_silence: self.clock,
-                    dropped: Vec::new(),
-                };
-                self.watch.on_second(second, self.now);
-            }
-            self.watch.faults.iter().map(|(fault, _)| fault).collect()
-        }
-    }
-
-    #[test]
-    fn silence_is_a_fault_when_somebody_could_speak_and_ends_with_a_word() {
-        let mut scene = Scene::new();
-        assert_eq!(scene.pass(60, false, false), [], "nobody is there");
-        scene.publishers("/points", 1);
-        assert_eq!(scene.pass(5, false, false), []);
-        assert_eq!(scene.pass(1, false, false), [Fault::SilentPublisher]);
-        assert_eq!(scene.pass(1, true, false), []);
-        assert_eq!(scene.pass(5, false, false), [Fault::SilentPublisher]);
-        scene.publishers("/points", 0);
-        assert_eq!(scene.pass(1, false, false), [Fault::NoDetections]);
-    }
-
-    #[test]
-    fn camera_without_detections_is_a_fault() {
-        let mut scene = Scene::new();
-        assert_eq!(scene.pass(4, false, true), []);
-        assert_eq!(scene.pass(1, false, true), [Fault::NoDetections]);
-        assert_eq!(scene.pass(1, true, true), []);
-    }
-
-    #[test]
-    fn steady_camera_info_gets_stale_and_a_latched_one_does_not() {
-        let mut scene = Scene::new();
-        assert_eq!(scene.pass(2, true, true), []);
-        assert_eq!(scene.pass(60, true, false), [], "it may be sent once");
-        assert_eq!(scene.pass(3, true, true), []);
-        assert_eq!(scene.pass(4, true, false), []);
-        assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo]);
-        assert_eq!(scene.pass(1, true, true), []);
-    }
-
-    #[test]
-    fn simulated_time_that_never_comes_or_stops_is_a_fault_until_it_comes() {
-        let mut scene = Scene::new();
-        for ever in [false, true] {
-            let since = scene.now;
-            scene.clock = Some(ClockSilence { since, ever });
-            assert_eq!(scene.pass(4, false, false), []);
-            assert_eq!(scene.pass(1, false, false), [Fault::NoClock]);
-            let since = scene.now;
-            scene.clock = Some(ClockSilence { since, ever: true });
-            assert_eq!(scene.pass(1, false, false), []);
-        }
-        scene.clock = None;
-        assert_eq!(
-            scene.pass(60, false, false),
-            [],
-            "time is the system's again"
-        );
-    }
-
-    #[test]
-    fn camera_that_begins_anew_may_send_once() {
-        let mut scene = Scene::new();
-        scene.publishers("/camera", 1);
-        assert_eq!(scene.pass(5, true, true), []);
-        scene.publishers("/camera", 0);
-        assert_eq!(scene.pass(4, true, false), []);
-        assert_eq!(scene.pass(1, true, false), [Fault::StaleCameraInfo], "gone");
-        scene.publishers("/camera", 1);
-        assert_eq!(scene.pass(1, true, true), []);
-        assert_eq!(scene.pass(60, true, false), [], "it may be latched now");
-        assert_eq!(scene.pass(3, true, true), []);
-        assert_eq!(scene.pass(5, true, false), [Fault::StaleCameraInfo]);
-    }
-
-    #[test]
-    fn camera_that_comes_a_moment_after_the_detections_is_no_fault() {
-        let mut scene = Scene::new();
-        scene
-            .watch
-            .on_refusal(Fault::NoCameraInfo, "no camera", scene.now);
-        assert_eq!(scene.pass(1, true, false), []);
-        assert_eq!(scene.pass(60, true, true), []);
-    }
-
-    #[test]
-    fn refusals_for_the_surroundings_last_until_they_are_answered() {
-        let mut scene = Scene::new();
-        let (watch, now) = (&mut scene.watch, scene.now);
-        watch.on_refusal(Fault::NoCameraInfo, "no camera", now);
-        watch.on_refusal(Fault::FrameMismatch, "frames", now);
-        assert_eq!(scene.pass(1, true, false), [Fault::FrameMismatch]);
-        let both = [Fault::NoCameraInfo, Fault::FrameMismatch];
-        assert_eq!(scene.pass(1, true, false), both, "a camera may come late");
-        assert_eq!(scene.pass(2, true, true), [Fault::FrameMismatch]);
-        assert_eq!(scene.pass(1, true, true), [Fault::FrameMismatch]);
-        scene.watch.on_image(Time { sec: 7, nanosec: 0 }, scene.now);
-        assert_eq!(scene.pass(1, true, true), []);
-    }
-}
+mod tests;
