@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // each test binary uses its part
 
+use std::sync::LazyLock;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -111,9 +113,12 @@ fn normal3(random: &mut ChaCha8Rng) -> Vector3<f64> {
     Vector3::from_fn(|_, _| StandardNormal.sample(random))
 }
 
+/// Read once: in a flight of 1500 frames the YAML would take most of the time.
+static PAPER_MAP: LazyLock<MarkerMap> =
+    LazyLock::new(|| MarkerMap::shipped("paper").expect("shipped"));
+
 fn seen(pose: &Isometry3<f64>, random: &mut ChaCha8Rng) -> Vec<Observation> {
-    let map = MarkerMap::shipped("paper").expect("shipped");
-    Scene::new(paper_camera(), &map, *pose).noisy_observations(SIGMA_PX, random)
+    Scene::new(paper_camera(), &PAPER_MAP, *pose).noisy_observations(SIGMA_PX, random)
 }
 
 /// A motion drawn from the filter's own model, 40 m ahead: start and noise have the settings' variances.

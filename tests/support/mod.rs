@@ -3,6 +3,8 @@
 
 #![allow(dead_code)] // each test binary uses its part
 
+use std::sync::LazyLock;
+
 use nalgebra::{
     Isometry3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector3, Vector4, Vector6,
 };
@@ -16,6 +18,10 @@ use tanker_pose::estimation::{
 use tanker_pose::geometry::pose_error;
 use tanker_pose::simulation::{Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::{Marker, MarkerMap};
+
+/// Read once: parsing the YAML takes longer than a frame.
+pub static PAPER_MAP: LazyLock<MarkerMap> =
+    LazyLock::new(|| MarkerMap::shipped("paper").expect("shipped"));
 
 /// Settings that only estimate: any three points will do, none is left out, and no rival pose refuses one.
 pub fn settings(initialisation: Initialisation, refinement: Refinement) -> EstimatorSettings {
@@ -43,8 +49,7 @@ pub fn random_refuelling_scene(
         angle(),
         angle(),
     );
-    let map = MarkerMap::shipped("paper").expect("shipped");
-    Scene::new(paper_camera(), &map, pose)
+    Scene::new(paper_camera(), &PAPER_MAP, pose)
 }
 
 /// Six points in general position about the tanker's origin, at any attitude, 15 m ahead.
@@ -175,10 +180,7 @@ pub fn tanker_markers(count: usize) -> Vec<Marker> {
         (11, 6.0, -1.5, 2.0),
         (12, 6.0, 1.5, 2.0),
     ];
-    let mut markers = MarkerMap::shipped("paper")
-        .expect("shipped")
-        .markers()
-        .to_vec();
+    let mut markers = PAPER_MAP.markers().to_vec();
     markers.extend(more.map(|(id, x, y, z)| Marker {
         id,
         marker_in_tanker: nalgebra::Point3::new(x, y, z),
