@@ -7,15 +7,18 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
-use nalgebra::{Matrix3, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6};
 use tanker_pose::camera::{Pixel, Ray};
 use tanker_pose::estimation::{
     ErrorBudget, Estimator, EstimatorSettings, Initialisation, Refinement, fixed_point,
     iterate_accelerated, iterate_literally,
 };
-use tanker_pose::geometry::optical_from_body;
+use tanker_pose::frames::flu_from_optical;
+use tanker_pose::geometry::{PoseCovariance, optical_from_body};
+use tanker_pose::integrity::{IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount};
 use tanker_pose::refuelling::Region;
 use tanker_pose::simulation::paper_camera;
+use tanker_pose::target::{Marker, MarkerMap};
 use tanker_pose::tracking::{Filter, FilterSettings, LastingError};
 
 #[path = "../tests/solver_support/mod.rs"]
@@ -69,6 +72,58 @@ fn estimates(criterion: &mut Criterion) {
     group.bench_function(BenchmarkId::new("prior_plumb_bob", 6), |bencher| {
         bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
     });
+}
+
+/// Protection levels of one point, beside the estimate that they belong to.
+fn integrity(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("integrity");
+    for count in [6, 12, 24] {
+        let (camera, seen) = (paper_camera(), frame(&paper_camera(), count));
+        let markers: Vec<Marker> = seen
+            .iter()
+            .map(|seen| Marker {
+                id: seen.id,
+                marker_in_tanker: seen.marker_in_tanker,
+            })
+            .collect();
+        let map = MarkerMap::new("bench", &markers).expect("a map");
+        for (name, pairs, budget) in [
+            ("singles", false, None),
+            ("pairs", true, None),
+            ("pairs_budget", true, Some(full_budget(&seen))),
+        ] {
+            let estimator = Estimator::new(EstimatorSettings::default());
+            let estimator = match budget {
+                Some(budget) => estimator.with_budget(budget),
+                None => estimator,
+            };
+            let solution = estimator.estimate(&camera, &seen, None).expect("a pose");
+            let mount = Mount {
+                receiver_from_camera: Isometry3::from_parts(
+                    Translation3::identity(),
+                    flu_from_optical().into(),
+                ),
+                covariance: PoseCovariance(Matrix6::zeros()),
+            };
+            let point = IntegrityPoint {
+                name: "receptacle".to_owned(),
+                point_in_tanker: Point3::new(7.8, 0.0, 1.0),
+                covariance: Matrix3::zeros(),
+                alert_limit_m: None,
+            };
+            let settings = IntegritySettings {
+                pairs,
+                hmi_probability: 1e-6,
+                ..IntegritySettings::default()
+            };
+            let monitor = IntegrityMonitor::new(settings, mount, vec![point]);
+            group.bench_function(BenchmarkId::new(name, count), |bencher| {
+                bencher.iter(|| {
+                    monitor.judge(&estimator, Some(&map), &camera, black_box(&seen), &solution)
+                });
+            });
+        }
+    }
 }
 
 /// The same frames with every cause of an error budget.
@@ -223,6 +278,7 @@ criterion_group!(
     rays,
     estimates,
     with_budget,
+    integrity,
     exclusion,
     orthogonal_iteration,
     filter,

@@ -9,6 +9,7 @@
 //! picture             the geometry of a frame in space, for display
 //! pipeline, config    the processing of one frame; raw parameters -> checked settings
 //! refuelling          the receptacle relative to the probe, with probabilities
+//! integrity           bounds of a pose's error, undetected faults included
 //! tracking, frames    a motion from poses over time; poses for flight stacks
 //! estimation          a pose from known markers and pixels: initialise, iterate, refine, judge, covariance
 //! camera, target      pixel <-> ray; marker id -> point on the tanker
@@ -24,6 +25,7 @@ pub mod config;
 pub mod estimation;
 pub mod frames;
 pub mod geometry;
+pub mod integrity;
 pub mod picture;
 pub mod pipeline;
 pub mod refuelling;

@@ -213,6 +213,7 @@ mod tests {
             initialisation: None,
             track: FrameTrack::default(),
             causes: None,
+            integrity: None,
             widened_by: 1.0,
         };
         let detections = [

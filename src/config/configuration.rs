@@ -7,6 +7,7 @@ use super::table::Values;
 use super::{CalibrationSigmas, ConsumerConfiguration, Input, Parameters, Settings};
 use crate::estimation::{CorrelatedNoise, EstimatorSettings, Initialisation};
 use crate::geometry::optical_from_body;
+use crate::integrity::IntegritySettings;
 use crate::refuelling::ExpectedAttitude;
 use crate::tracking::{CheckedFilterSettings, FilterSettings};
 
@@ -31,6 +32,8 @@ pub struct Configuration {
     pub use_sim_time: bool,
     /// Whether the node is managed: a lifecycle node.
     pub lifecycle: bool,
+    /// Whether to publish protection levels.
+    pub publish_integrity: bool,
     /// Whether to publish markers for `RViz` and Foxglove.
     pub publish_markers: bool,
     /// Whether to publish predicted points for detectors.
@@ -69,6 +72,8 @@ impl From<&Parameters> for Configuration {
                 edge_margin_px: values.edge_margin_px,
                 widen_by_sigma_factor: values.widen_by_sigma_factor,
                 rectified: values.rectified,
+                integrity: values.publish_integrity.then(|| integrity(&values)),
+                receiver_from_camera: expected_attitude(&values).receiver_from_camera(),
                 track: values.track.then(|| filter_settings(&values)),
             },
             expected_attitude: expected_attitude(&values),
@@ -79,6 +84,7 @@ impl From<&Parameters> for Configuration {
             publish_tf: values.publish_tf,
             use_sim_time: values.use_sim_time,
             lifecycle: values.lifecycle,
+            publish_integrity: values.publish_integrity,
             publish_markers: values.publish_markers,
             publish_predicted_points: values.publish_predicted_points,
             input: values.input,
@@ -98,6 +104,18 @@ fn estimator_settings(values: &Values) -> EstimatorSettings {
         max_ambiguity: values.max_ambiguity,
         attitude_sigma_rad: (values.nominal_attitude_sigma_deg > 0.0)
             .then(|| values.nominal_attitude_sigma_deg.to_radians()),
+    }
+}
+
+fn integrity(values: &Values) -> IntegritySettings {
+    IntegritySettings {
+        hmi_probability: values.hmi_probability,
+        false_alert_probability: values.false_alert_probability,
+        fault_probability: values.beacon_fault_probability,
+        pairs: values.monitor_pairs,
+        flex_fault_probability: values.flex_fault_probability,
+        calibration_fault_probability: values.calibration_fault_probability,
+        frames: values.integrity_frames,
     }
 }
 

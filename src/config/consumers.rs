@@ -39,6 +39,8 @@ pub struct ConsumerConfiguration {
     pub px4_minus_ros_us: i64,
     /// Whether there is a track; some outputs publish it.
     pub track: bool,
+    /// Whether outputs are held back while an alert limit is not kept.
+    pub require_integrity: bool,
 }
 
 /// Why outputs cannot be switched on.
@@ -177,6 +179,7 @@ impl From<&Values> for ConsumerConfiguration {
             attitude_rate_covariance: isotropic(values.attitude_rate_sigma_dps),
             px4_minus_ros_us: values.px4_minus_ros_us,
             track: values.track,
+            require_integrity: values.require_integrity,
         }
     }
 }

@@ -24,6 +24,7 @@ pub use settings::{CalibrationSigmas, Settings};
 pub use table::{KEYS, Keys, SECTIONS, TABLE};
 pub use words::{Attitude, AttitudeSource, Input};
 
+use crate::estimation::Refinement;
 use table::Values;
 
 /// Checks values against each other: each of them is allowed, but one output may need what another parameter switches
@@ -48,6 +49,19 @@ pub fn check_together(parameters: &Parameters) -> Result<(), TogetherError> {
         let file = KEYS.calibration_budget_file.name();
         return Err(TogetherError::TwoCalibrations { file, sigma });
     }
+    let required = values.require_integrity.then_some(&KEYS.require_integrity);
+    if let (Some(required), false) = (required, values.publish_integrity) {
+        return Err(TogetherError::NoIntegrity {
+            required: required.name(),
+            missing: KEYS.publish_integrity.name(),
+        });
+    }
+    if values.publish_integrity && values.refinement != Refinement::MaximumLikelihood {
+        return Err(TogetherError::NotMaximumLikelihood {
+            output: KEYS.publish_integrity.name(),
+            refinement: KEYS.refinement.name(),
+        });
+    }
     Ok(ConsumerConfiguration::from(&values).check()?)
 }
 
@@ -65,5 +79,21 @@ pub enum TogetherError {
         file: &'static str,
         /// A standard deviation above 0.
         sigma: &'static str,
+    },
+    /// Outputs depend on protection levels that are not computed.
+    #[error("{required} needs {missing}")]
+    NoIntegrity {
+        /// The parameter that asks for them.
+        required: &'static str,
+        /// The parameter that switches them on.
+        missing: &'static str,
+    },
+    /// Protection levels need an estimate whose errors are known.
+    #[error("{output} needs {refinement} maximum_likelihood")]
+    NotMaximumLikelihood {
+        /// The parameter that switches them on.
+        output: &'static str,
+        /// The parameter that chooses the estimate.
+        refinement: &'static str,
     },
 }

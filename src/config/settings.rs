@@ -1,6 +1,9 @@
 //! Settings for the processing of a frame.
 
+use nalgebra::Rotation3;
+
 use crate::estimation::{CorrelatedNoise, EstimatorSettings};
+use crate::integrity::IntegritySettings;
 use crate::tracking::CheckedFilterSettings;
 
 /// All settings for the processing of a frame, checked.
@@ -20,6 +23,10 @@ pub struct Settings {
     pub correlated_noise: Option<CorrelatedNoise>,
     /// Whether pixels are those of the rectified image: P instead of K and D.
     pub rectified: bool,
+    /// Probabilities of protection levels; `None`: none are computed.
+    pub integrity: Option<IntegritySettings>,
+    /// How the camera is turned in the receiver: optical axes to x ahead, y left, z up.
+    pub receiver_from_camera: Rotation3<f64>,
     /// Track settings; `None` disables tracking.
     pub track: Option<CheckedFilterSettings>,
 }

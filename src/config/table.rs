@@ -145,6 +145,29 @@ ros2_node::declare_parameters! {
         confirm_frames: u32 = count(5, [2, 1000]);
     }
 
+    "Protection levels: docs/integrity.md" {
+        /// publish integrity: how far the tanker may be from where the pose has it, with a probability of error that is
+        /// stated, undetected faults of beacons included; needs refinement maximum_likelihood
+        publish_integrity: bool = output();
+        /// receptacle and flight-stack outputs are held back unless every alert limit of the refuelling file is kept; needs
+        /// publish_integrity
+        require_integrity: bool = switch(false).fixed();
+        /// probability with which an error may exceed its protection level in one of integrity_frames frames
+        hmi_probability: f64 = double(1e-7, [1e-12, 0.01]);
+        /// probability with which one of so many frames without a fault is declared faulty
+        false_alert_probability: f64 = double(1e-5, [1e-9, 0.1]);
+        /// probability that a beacon is faulty (a reflection, a wrong id, a displaced centre) during so many frames, each
+        beacon_fault_probability: f64 = double(1e-4, [1e-9, 0.1]);
+        /// whether two beacons at once are monitored; if not, their probability counts as unmonitored
+        monitor_pairs: bool = switch(true);
+        /// probability that a flex mode of the marker map is beyond its sigma by any amount, each; 0: never
+        flex_fault_probability: f64 = double(0.0, [0.0, 0.1]);
+        /// the same for each sigma of the calibration and for jitter
+        calibration_fault_probability: f64 = double(0.0, [0.0, 0.1]);
+        /// frames over which these probabilities hold: 1, or those of an approach
+        integrity_frames: u32 = count(1, [1, 60_000]);
+    }
+
     "Refuelling and flight stacks: docs/from_camera_to_autopilot.md" {
         /// none, or the path of a YAML file such as config/refuelling/example.yaml with camera, probe tip, receptacle and
         /// envelope; all outputs of this section need one

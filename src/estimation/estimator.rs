@@ -6,7 +6,7 @@ use nalgebra::{Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
-use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses};
+use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses, LinearFrame};
 use super::exclude::Found;
 use super::initialise::{self, linear_rotation};
 use super::lanes::points::{INLINE_POINTS, mean};
@@ -113,6 +113,32 @@ impl Estimator {
             observations,
             solution,
         )
+    }
+
+    /// Returns a frame linearised at its solution, without the points that it leaves out; `None` for an estimate that
+    /// is not maximum likelihood, or where a point has no pixel at the pose.
+    ///
+    /// # Inputs
+    /// * `observations`: those that the solution was estimated from.
+    #[must_use]
+    pub fn linearised(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        solution: &Solution,
+    ) -> Option<LinearFrame> {
+        if self.settings.refinement != Refinement::MaximumLikelihood {
+            return None;
+        }
+        let floored = with_sigma_floor(observations, self.settings.min_points);
+        let used = floored
+            .as_deref()
+            .unwrap_or(observations)
+            .iter()
+            .filter(|seen| !solution.excluded.contains(seen.id));
+        let information = self.attitude_prior().map_or(0.0, |prior| prior.information);
+        let pose = &solution.camera_from_tanker;
+        LinearFrame::new(self.budget.as_ref(), information, camera, used, pose)
     }
 
     fn attitude_prior(&self) -> Option<AttitudePrior> {

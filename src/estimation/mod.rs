@@ -41,7 +41,7 @@ use crate::geometry::PoseCovariance;
 
 pub use budget::{
     BudgetError, CalibrationMode, Cause, CauseKind, CorrelatedNoise, CorrelatedNoiseError,
-    ErrorBudget, FlexMode, FrameCauses,
+    ErrorBudget, FlexMode, FrameCauses, LinearFrame,
 };
 pub use estimator::Estimator;
 pub(crate) use estimator::PRIOR_SIGMA;

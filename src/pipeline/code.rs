@@ -1,4 +1,6 @@
-//! The constants of `tanker_pose/msg/EstimatorStatus`, for counters and output.
+//! The constants of `tanker_pose/msg/EstimatorStatus` and `Integrity`, for counters and output.
+
+use crate::integrity::{FrameIntegrity, Unavailable};
 
 /// Declares an enum of constants: variant, number on the wire and name.
 macro_rules! status_codes {
@@ -73,6 +75,36 @@ status_codes! {
 }
 
 status_codes! {
+    /// The state of a frame's protection levels: the constants of `tanker_pose/msg/Integrity`.
+    IntegrityState
+    /// There are levels, and no alert limit is exceeded.
+    Available = 0 "AVAILABLE",
+    /// There is no trusted pose.
+    NoPose = 1 "NO_POSE",
+    /// The beacons contradict each other.
+    Fault = 2 "FAULT",
+    /// Faults that nothing would show are too likely.
+    Unmonitored = 3 "UNMONITORED",
+    /// A level exceeds its alert limit.
+    AboveLimit = 4 "ABOVE_LIMIT",
+    /// The points do not determine the pose well enough for levels.
+    NotComputed = 5 "NOT_COMPUTED",
+}
+
+impl From<&Result<FrameIntegrity, Unavailable>> for IntegrityState {
+    fn from(levels: &Result<FrameIntegrity, Unavailable>) -> Self {
+        match levels {
+            Ok(found) if found.above_limit.is_some() => Self::AboveLimit,
+            Ok(_) => Self::Available,
+            Err(Unavailable::NoPose) => Self::NoPose,
+            Err(Unavailable::Fault { .. }) => Self::Fault,
+            Err(Unavailable::Unmonitored { .. }) => Self::Unmonitored,
+            Err(_) => Self::NotComputed,
+        }
+    }
+}
+
+status_codes! {
     /// The effect of a frame on the track: the constants `TRACK_…`.
     TrackCode
     /// There is no track, or the frame does not apply to it.
@@ -95,8 +127,10 @@ status_codes! {
 mod tests {
     use super::*;
 
-    fn constants() -> impl Iterator<Item = (&'static str, u8)> {
-        let definition = include_str!("../../msg/EstimatorStatus.msg");
+    const STATUS: &str = include_str!("../../msg/EstimatorStatus.msg");
+    const INTEGRITY: &str = include_str!("../../msg/Integrity.msg");
+
+    fn constants(definition: &'static str) -> impl Iterator<Item = (&'static str, u8)> {
         definition.lines().filter_map(|line| {
             let (name, value) = line
                 .split('#')
@@ -109,12 +143,14 @@ mod tests {
 
     #[test]
     fn codes_are_those_of_the_message_definition() {
-        let outcomes = constants().filter(|(name, _)| {
+        let outcomes = constants(STATUS).filter(|(name, _)| {
             !name.starts_with("INITIALISATION_") && !name.starts_with("TRACK_")
         });
         assert!(outcomes.eq(OutcomeCode::ALL.map(|code| (code.name(), code.number()))));
-        let tracks =
-            constants().filter_map(|(name, value)| Some((name.strip_prefix("TRACK_")?, value)));
+        let tracks = constants(STATUS)
+            .filter_map(|(name, value)| Some((name.strip_prefix("TRACK_")?, value)));
         assert!(tracks.eq(TrackCode::ALL.map(|code| (code.name(), code.number()))));
+        let states = IntegrityState::ALL.map(|code| (code.name(), code.number()));
+        assert!(constants(INTEGRITY).eq(states));
     }
 }

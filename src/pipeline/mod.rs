@@ -18,6 +18,7 @@ mod lasting;
 mod next_image;
 mod outcome;
 mod predict;
+mod protected;
 mod refusal;
 mod residuals;
 mod sigma_watch;
@@ -37,11 +38,13 @@ use crate::config::Settings;
 use crate::estimation::{
     CalibrationMode, ErrorBudget, EstimateError, Estimator, Initialisation, Observation,
 };
+use crate::integrity::{IntegrityMonitor, Unavailable};
+use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
 
 pub use budget::{budget_in_words, error_budget, modes_of_file};
 pub use checks::observe;
-pub use code::{OutcomeCode, TrackCode};
+pub use code::{IntegrityState, OutcomeCode, TrackCode};
 pub use edge::{ImageEdges, LeftOut};
 pub use frame::{Detection, DetectionFrame};
 pub use frame_track::FrameTrack;
@@ -50,6 +53,7 @@ pub use next_image::NextImage;
 pub use outcome::FrameOutcome;
 pub use predict::PredictedPoint;
 use predict::{Predictor, View};
+pub use protected::integrity_monitor;
 pub use refusal::Refusal;
 pub use residuals::MarkerResidual;
 pub use sigma_watch::SigmaFactor;
@@ -115,6 +119,8 @@ pub struct Pipeline {
     suspects: Suspects,
     sigmas: SigmaWatch,
     widening: Widening,
+    setup: Option<RefuellingSetup>,
+    integrity: Option<IntegrityMonitor>,
 }
 
 impl Pipeline {
@@ -128,6 +134,8 @@ impl Pipeline {
             suspects: Suspects::default(),
             sigmas: SigmaWatch::default(),
             widening: Widening::default(),
+            setup: None,
+            integrity: monitor(&settings, &map, None),
             settings,
             map,
             calibration: None,
@@ -143,6 +151,31 @@ impl Pipeline {
             calibration,
             ..self
         }
+    }
+
+    /// Returns the pipeline with the receptacle of a refuelling setup as a point that protection levels are for, and the
+    /// mount's errors in them.
+    #[must_use]
+    pub fn with_refuelling(self, setup: Option<RefuellingSetup>) -> Self {
+        Self {
+            integrity: monitor(&self.settings, &self.map, setup.as_ref()),
+            setup,
+            ..self
+        }
+    }
+
+    /// Returns what computes protection levels; `None` where none are wanted.
+    #[must_use]
+    pub fn integrity(&self) -> Option<&IntegrityMonitor> {
+        self.integrity.as_ref()
+    }
+
+    /// Returns the name of a mode of the error budget by its place.
+    #[must_use]
+    pub fn mode_name(&self, index: usize) -> String {
+        let budget = self.estimator.budget();
+        let name = budget.and_then(|budget| budget.mode_name(index));
+        name.map_or_else(|| format!("mode {index}"), str::to_owned)
     }
 
     /// Replaces the settings from the next frame on; camera, last attitude and track stay. With another error budget
@@ -168,6 +201,7 @@ impl Pipeline {
         }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
+        self.integrity = monitor(&self.settings, &self.map, self.setup.as_ref());
         if is_other {
             self.renew_estimator();
         }
@@ -278,6 +312,9 @@ impl Pipeline {
             self.watch_scatter(frame.stamp, &outcome);
         }
         let mut outcome = self.suspects.judge(outcome);
+        if self.integrity.is_some() && outcome.result.is_err() {
+            outcome.integrity = Some(Err(Unavailable::NoPose));
+        }
         let has_causes = self.estimator.has_causes();
         self.tracker.follow(frame.stamp, &mut outcome, has_causes);
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
@@ -309,6 +346,16 @@ impl Pipeline {
         let previous = self.expected_rotation(frame.stamp);
         let mut outcome = solve(&self.estimator, camera, &observations, previous.as_ref());
         outcome.widened_by = widened_by;
+        if let (Some(monitor), Ok(solution)) = (&self.integrity, &outcome.result) {
+            let levels = monitor.judge(
+                &self.estimator,
+                Some(&self.map),
+                camera,
+                &observations,
+                solution,
+            );
+            outcome.integrity = Some(levels);
+        }
         Ok(outcome.without(left_out))
     }
 
@@ -373,6 +420,16 @@ impl Pipeline {
         let nominal = &self.settings.estimator.nominal_camera_from_tanker;
         Ok(self.predictor.points(stamp, nominal, &view))
     }
+}
+
+fn monitor(
+    settings: &Settings,
+    map: &MarkerMap,
+    setup: Option<&RefuellingSetup>,
+) -> Option<IntegrityMonitor> {
+    let turned = &settings.receiver_from_camera;
+    let integrity = settings.integrity?;
+    Some(integrity_monitor(integrity, turned, Some(map), setup))
 }
 
 fn estimator(settings: &Settings, map: &MarkerMap, camera: Option<&LatchedCamera>) -> Estimator {

@@ -6,6 +6,7 @@ use crate::camera::Camera;
 use crate::estimation::{
     EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, Solution,
 };
+use crate::integrity::{FrameIntegrity, Unavailable};
 
 /// The outcome of one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +29,8 @@ pub struct FrameOutcome {
     pub track: FrameTrack,
     /// The effect of each cause of the error budget in this frame; `None` without a budget or a solution.
     pub causes: Option<FrameCauses>,
+    /// Protection levels, or why there are none; `None` where none are wanted.
+    pub integrity: Option<Result<FrameIntegrity, Unavailable>>,
     /// The factor by which the stated sigmas were multiplied; 1 if they were not.
     pub widened_by: f64,
 }
@@ -46,6 +49,7 @@ impl FrameOutcome {
             initialisation: None,
             track: FrameTrack::default(),
             causes: None,
+            integrity: None,
             widened_by: 1.0,
         }
     }
@@ -76,6 +80,7 @@ impl FrameOutcome {
             initialisation,
             track: FrameTrack::default(),
             causes: None,
+            integrity: None,
             widened_by: 1.0,
         }
     }

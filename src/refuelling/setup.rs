@@ -9,9 +9,10 @@
 //! receptacle_sigma: {x: 0.02, y: 0.05, z: 0.05}             # m, tanker frame
 //! pre_contact: {box: {min: {x: -0.5, y: -2.0, z: -2.0}, max: {x: 8.0, y: 2.0, z: 2.0}}}
 //! contact: {cylinder: {from_x_m: -0.1, to_x_m: 0.4, radius_m: 0.25}}
+//! alert_limit: {ahead_m: 1.0, lateral_m: 0.5, vertical_m: 0.5}  # optional, of the receptacle
 //! ```
 //!
-//! No key has a default: a forgotten lever arm would shift the receptacle unnoticed.
+//! No other key may be left out: a forgotten lever arm would shift the receptacle unnoticed.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 use serde::Deserialize;
@@ -25,6 +26,8 @@ use crate::yaml::{self, Place, YamlError};
 const FARTHEST_M: f64 = 1000.0;
 /// m; largest plausible standard deviation.
 const LARGEST_SIGMA_M: f64 = 100.0;
+/// m; no level is so small.
+const LEAST_ALERT_LIMIT_M: f64 = 1e-3;
 /// deg; beyond it a covariance is meaningless.
 const LARGEST_SIGMA_DEG: f64 = 10.0;
 
@@ -60,6 +63,9 @@ pub struct RefuellingSetup {
     pub name: String,
     /// The regions of the approach.
     pub envelope: Envelope,
+    /// Largest protection levels of the receptacle that contact may be made with: ahead, lateral, vertical in the
+    /// receiver, m; `None`: not stated.
+    pub alert_limit_m: Option<[f64; 3]>,
     camera_in_receiver: Vector3<f64>,
     mount_covariance: PoseCovariance,
     probe_tip_in_receiver: Point3<f64>,
@@ -78,6 +84,19 @@ struct RawSetup {
     receptacle_sigma: RawPoint,
     pre_contact: RawRegion,
     contact: Spanned<RawRegion>,
+    alert_limit: Option<RawAlertLimit>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(
+    clippy::struct_field_names,
+    reason = "keys of the file, with their unit"
+)]
+struct RawAlertLimit {
+    ahead_m: Spanned<f64>,
+    lateral_m: Spanned<f64>,
+    vertical_m: Spanned<f64>,
 }
 
 #[derive(Deserialize)]
@@ -138,7 +157,20 @@ impl RefuellingSetup {
             place: Place::at(source, raw.contact.referenced),
             source: Box::new(error),
         })?;
+        let limit = |value, field| {
+            let of = format!("{field} of alert_limit");
+            read.number(value, &of, LEAST_ALERT_LIMIT_M, FARTHEST_M)
+        };
+        let alert_limit_m = match &raw.alert_limit {
+            Some(raw) => Some([
+                limit(&raw.ahead_m, "ahead_m")?,
+                limit(&raw.lateral_m, "lateral_m")?,
+                limit(&raw.vertical_m, "vertical_m")?,
+            ]),
+            None => None,
+        };
         Ok(Self {
+            alert_limit_m,
             camera_in_receiver: far(&raw.camera_in_receiver, "camera_in_receiver")?,
             probe_tip_in_receiver: far(&raw.probe_tip_in_receiver, "probe_tip_in_receiver")?.into(),
             receptacle_in_tanker: far(&raw.receptacle_in_tanker, "receptacle_in_tanker")?.into(),
@@ -282,6 +314,22 @@ mod tests {
             "receptacle_in_tanker: {x: .nan",
         );
         assert!(error.ends_with("got NaN"), "{error}");
+    }
+
+    #[test]
+    fn alert_limits_are_optional_and_checked() {
+        let with = |limit: &str| {
+            let text = format!("{EXAMPLE}\nalert_limit: {limit}\n");
+            RefuellingSetup::from_yaml(&text, "s.yaml")
+        };
+        let setup = with("{ahead_m: 1.5, lateral_m: 0.5, vertical_m: 0.4}").expect("a setup");
+        assert_eq!(setup.alert_limit_m, Some([1.5, 0.5, 0.4]));
+        let without = RefuellingSetup::from_yaml(EXAMPLE, "s.yaml").expect("a setup");
+        assert_eq!(without.alert_limit_m, None);
+        let error = with("{ahead_m: 1.5, lateral_m: 0, vertical_m: 0.4}").expect_err("no limit");
+        let expected = "lateral_m of alert_limit must be from 0.001 to 1000, got 0.0";
+        assert!(error.to_string().ends_with(expected), "{error}");
+        assert!(with("{ahead_m: 1.5}").is_err());
     }
 
     #[test]

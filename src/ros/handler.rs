@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use super::attitude::AttitudeMessage;
-use super::consumers::Consumers;
+use super::consumers::{Consumers, Protection, Silence};
 use super::convert;
 use super::graph::Graph;
-use super::health::Unexpected;
 use super::input::{InputMessage, InputReader, Sighting};
 use super::messages::{CameraInfo, Header};
 use super::monitor::{Answer, Monitor, Subject};
@@ -104,9 +103,17 @@ impl Handler {
         };
         let unexpected = self.monitor.on_answer(&answer);
 
+        let is_protected = self.outputs.integrity.as_mut().is_some_and(|integrity| {
+            integrity.on_outcome(&header, &outcome, &self.pipeline, &mut self.monitor.tally)
+        });
         if let Ok(solution) = &outcome.result {
             self.publish_pose(&header, solution);
-            self.publish_to_flight_stacks(&header, solution, &outcome, unexpected);
+            let trust = match unexpected {
+                Some(unexpected) => Err(unexpected.into()),
+                None if is_protected => Ok(Protection::Given),
+                None => Ok(Protection::None),
+            };
+            self.publish_to_flight_stacks(&header, solution, &outcome, trust);
         }
         self.publish_odometry(&header, &outcome);
         self.outputs.status.publish(status, &mut self.monitor.tally);
@@ -175,6 +182,11 @@ impl Handler {
                 .status
                 .push(consumers.diagnostics(self.monitor.node()));
         }
+        if let Some(integrity) = &mut self.outputs.integrity {
+            report
+                .status
+                .push(integrity.diagnostics(self.monitor.node()));
+        }
         self.outputs
             .diagnostics
             .publish(report, &mut self.monitor.tally);
@@ -203,17 +215,17 @@ impl Handler {
         header: &Header,
         solution: &Solution,
         outcome: &FrameOutcome,
-        unexpected: Option<Unexpected>,
+        trust: Result<Protection, Silence>,
     ) {
         let Some(consumers) = &mut self.outputs.consumers else {
             return;
         };
         let corrected = outcome.track.code() == TrackCode::Updated;
         let motion = outcome.track.motion.as_ref().filter(|_| corrected);
-        let place = match unexpected {
-            Some(unexpected) => Err(unexpected),
-            None => Ok((solution, motion)),
-        };
+        let place = trust.and_then(|protection| {
+            consumers.check(protection)?;
+            Ok((solution, motion))
+        });
         consumers.on_pose(header, place, &mut self.monitor.tally);
     }
 

@@ -26,6 +26,7 @@ mod handler;
 pub mod health;
 pub mod input;
 mod inputs;
+mod integrity;
 pub mod messages;
 mod monitor;
 pub mod node;

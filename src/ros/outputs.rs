@@ -1,6 +1,7 @@
 //! All topics that the node publishes on.
 
 use super::consumers::Consumers;
+use super::integrity::IntegrityOutput;
 use super::messages::{
     DiagnosticArray, EstimatorStatus, MarkerArray, Odometry, PoseWithCovarianceStamped, TFMessage,
 };
@@ -27,6 +28,8 @@ pub struct Outputs {
     pub markers: Option<Output<MarkerArray>>,
     /// Where markers will be, for detectors, if wanted.
     pub predicted_points: Option<PredictedPoints>,
+    /// Protection levels, if wanted.
+    pub integrity: Option<IntegrityOutput>,
     /// The node's health.
     pub diagnostics: Output<DiagnosticArray>,
     /// Outputs for refuelling and flight stacks, if enabled.
@@ -52,6 +55,8 @@ impl Outputs {
             transform: Output::open_if_wanted(ros, &topics::TRANSFORM, wanted)?,
             markers: Output::open_if_wanted(ros, &topics::MARKERS, wanted)?,
             predicted_points: predicted.map(PredictedPoints::new),
+            integrity: Output::open_if_wanted(ros, &topics::INTEGRITY, wanted)?
+                .map(IntegrityOutput::new),
             diagnostics: Output::open(ros, &topics::HEALTH)?,
             consumers: Consumers::open(ros, wanted, setup)?,
         })

@@ -261,18 +261,18 @@ impl<'a> Server<'a> {
         self.clean_up();
         let outputs = match std::mem::replace(&mut self.work, Work::Closed) {
             Work::Idle(mut outputs) => {
-                outputs.configure(configuration, files.setup);
+                outputs.configure(configuration, files.setup.clone());
                 *outputs
             }
             Work::Closed | Work::Ready(_) => {
-                let outputs = Outputs::open(self.ros, configuration, files.setup)?;
+                let outputs = Outputs::open(self.ros, configuration, files.setup.clone())?;
                 // Inputs last: what arrives can be answered.
                 self.inputs = Some(Inputs::open(self.ros, configuration)?);
                 outputs
             }
         };
         self.introduce(configuration, &files.map, files.calibration.as_ref());
-        let mut handler = self.handler(configuration, files.map, files.calibration, outputs)?;
+        let mut handler = self.handler(configuration, files, outputs)?;
         handler.understand(configuration);
         self.work = Work::Ready(Box::new(handler));
         Ok(())
@@ -297,22 +297,22 @@ impl<'a> Server<'a> {
         log::info!("{}", budget_in_words(map.budget(), sigmas, calibration));
     }
 
-    /// Returns what handles the messages, for this configuration and map.
+    /// Returns what handles the messages, for this configuration and its files.
     fn handler(
         &self,
         configuration: &Configuration,
-        map: MarkerMap,
-        calibration: Option<CalibrationBudget>,
+        files: Files,
         outputs: Outputs,
     ) -> Result<Handler, NamesError> {
-        let map = Arc::new(map);
+        let map = Arc::new(files.map);
         let reader = InputReader {
             input: configuration.input,
             map: Arc::clone(&map),
             max_hamming: configuration.max_hamming,
         };
-        let pipeline =
-            Pipeline::new(configuration.settings.clone(), map).with_calibration_budget(calibration);
+        let pipeline = Pipeline::new(configuration.settings.clone(), map)
+            .with_calibration_budget(files.calibration)
+            .with_refuelling(files.setup);
         let names = self.ros.names();
         let watch = Watch::new(
             names.topic(configuration.input.topic().name)?,

@@ -88,6 +88,8 @@ topics! {
     ODOMETRY = output("odometry", OUTPUT, |_| true);
     /// Output: what became of every image.
     STATUS = output("status", OUTPUT, |_| true);
+    /// Output: protection levels of every image.
+    INTEGRITY = output("integrity", OUTPUT, |node| node.publish_integrity);
     /// Output: the node's health.
     HEALTH = output("/diagnostics", DIAGNOSTICS, |_| true);
     /// Output: trusted poses as transforms.

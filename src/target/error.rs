@@ -154,4 +154,33 @@ pub enum MarkerMapError {
         got: usize,
         most: usize,
     },
+    /// A point without a name of its own.
+    #[error(
+        "{place}: a point needs a name of its own of at most {most} bytes, got {}",
+        quoted(name)
+    )]
+    PointName {
+        place: Place,
+        name: String,
+        most: usize,
+    },
+    /// A point that is on no aircraft.
+    #[error(
+        "{place}: {axis} of point {} must be within {limit_m} m of the origin, got {value:?}",
+        quoted(name)
+    )]
+    PointNumber {
+        place: Place,
+        axis: char,
+        name: String,
+        value: f64,
+        limit_m: f64,
+    },
+    /// More points than a frame has time for.
+    #[error("{place}: a map may have at most {most} points, got {got}")]
+    TooManyPoints {
+        place: Place,
+        got: usize,
+        most: usize,
+    },
 }

@@ -5,10 +5,14 @@ use serde::Deserialize;
 use serde_saphyr::{Location, Spanned};
 
 use super::budget::{self, RawFlex};
-use super::check::{Part, check};
+use super::check::{MAX_COORDINATE_M, Part, check};
 use super::tag_file::{self, RawTag};
-use super::{Marker, MarkerMap, MarkerMapError, Tag};
+use super::{Marker, MarkerMap, MarkerMapError, NamedPoint, Tag};
 use crate::yaml::{self, Place};
+
+/// Most points: each costs as much as all others.
+const MOST_POINTS: usize = 8;
+const MOST_NAME_BYTES: usize = 64;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,6 +26,18 @@ struct RawMap {
     sigma: Option<Spanned<f64>>,
     #[serde(default)]
     flex: Vec<RawFlex>,
+    /// Whose position is to be protected.
+    #[serde(default)]
+    points: Vec<RawPoint>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPoint {
+    name: Spanned<String>,
+    x: Spanned<f64>,
+    y: Spanned<f64>,
+    z: Spanned<f64>,
 }
 
 fn nothing() -> Spanned<Vec<RawMarker>> {
@@ -123,7 +139,46 @@ fn read(text: &str, source: &str) -> Result<MarkerMap, MarkerMapError> {
         &markers,
         source,
     )?;
-    Ok(MarkerMap::sorted(&raw.name, markers, tags, budget))
+    let points = points(&raw.points, source)?;
+    Ok(MarkerMap::sorted(&raw.name, markers, tags, budget, points))
+}
+
+fn points(raw: &[RawPoint], source: &str) -> Result<Vec<NamedPoint>, MarkerMapError> {
+    if let Some(extra) = raw.get(MOST_POINTS) {
+        return Err(MarkerMapError::TooManyPoints {
+            place: Place::at(source, extra.name.referenced),
+            got: raw.len(),
+            most: MOST_POINTS,
+        });
+    }
+    let mut points: Vec<NamedPoint> = Vec::with_capacity(raw.len());
+    for point in raw {
+        let name = &point.name.value;
+        let is_named = !name.is_empty() && name.len() <= MOST_NAME_BYTES;
+        if !is_named || points.iter().any(|other| other.name == *name) {
+            return Err(MarkerMapError::PointName {
+                place: Place::at(source, point.name.referenced),
+                name: name.clone(),
+                most: MOST_NAME_BYTES,
+            });
+        }
+        for (axis, value) in [('x', &point.x), ('y', &point.y), ('z', &point.z)] {
+            if !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(&value.value) {
+                return Err(MarkerMapError::PointNumber {
+                    place: Place::at(source, value.referenced),
+                    axis,
+                    name: name.clone(),
+                    value: value.value,
+                    limit_m: MAX_COORDINATE_M,
+                });
+            }
+        }
+        points.push(NamedPoint {
+            name: name.clone(),
+            point_in_tanker: Point3::new(point.x.value, point.y.value, point.z.value),
+        });
+    }
+    Ok(points)
 }
 
 impl RawMarker {
@@ -181,6 +236,38 @@ markers:
         assert_eq!(map.name(), "kite");
         assert_eq!(map.get(1), Some(Point3::new(0.0, -1.5, 0.0)));
         assert_eq!(map.get(3), Some(Point3::new(3.0, 0.0, 0.25)));
+    }
+
+    #[test]
+    fn points_are_read_and_checked() {
+        let with = |points: &str| read(&format!("{GOOD}points:\n{points}"), "m.yaml");
+        let map = with("  - {name: tail, x: 7.8, y: 0, z: 1}\n").expect("a good map");
+        assert_eq!(map.points()[0].name, "tail");
+        assert_eq!(map.points()[0].point_in_tanker, Point3::new(7.8, 0.0, 1.0));
+        for (text, end) in [
+            (
+                "  - {name: tail, x: 7.8, y: .nan, z: 1}\n",
+                "m.yaml:7:29: y of point \"tail\" must be within 1000 m of the origin, got NaN",
+            ),
+            (
+                "  - {name: a, x: 1, y: 0, z: 1}\n  - {name: a, x: 2, y: 0, z: 1}\n",
+                "m.yaml:8:12: a point needs a name of its own of at most 64 bytes, got \"a\"",
+            ),
+            (
+                "  - {name: '', x: 1, y: 0, z: 1}\n",
+                "m.yaml:7:12: a point needs a name of its own of at most 64 bytes, got \"\"",
+            ),
+        ] {
+            assert_eq!(with(text).expect_err("a bad point").to_string(), end);
+        }
+        let many = (0..9).map(|n| format!("  - {{name: p{n}, x: 1, y: 0, z: 1}}\n"));
+        let error = with(&many.collect::<Vec<_>>().concat())
+            .expect_err("too many")
+            .to_string();
+        assert!(
+            error.ends_with("a map may have at most 8 points, got 9"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -15,6 +15,16 @@ pub struct MarkerMap {
     /// Ascending id.
     tags: Vec<Tag>,
     budget: MapBudget,
+    points: Vec<NamedPoint>,
+}
+
+/// A point of the tanker that is no marker.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedPoint {
+    /// Its name.
+    pub name: String,
+    /// Its position, tanker frame, m.
+    pub point_in_tanker: Point3<f64>,
 }
 
 /// Name and text of each shipped map.
@@ -36,6 +46,7 @@ impl MarkerMap {
             markers.to_vec(),
             Vec::new(),
             MapBudget::default(),
+            Vec::new(),
         ))
     }
 
@@ -80,6 +91,12 @@ impl MarkerMap {
         Some(self.markers[index].marker_in_tanker)
     }
 
+    /// Returns the points whose position is to be protected, in the order of the file.
+    #[must_use]
+    pub fn points(&self) -> &[NamedPoint] {
+        &self.points
+    }
+
     /// Returns the tag with this id; `None` if it is not on the map.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&Tag> {
@@ -87,11 +104,19 @@ impl MarkerMap {
         Some(&self.tags[index])
     }
 
+    /// Returns the tag that a point is a corner of; `None` for other points.
+    #[must_use]
+    pub fn tag_of_corner(&self, id: u32) -> Option<&Tag> {
+        self.tag(Tag::id_of_corner(id)?)
+    }
+
     /// Returns the position of a marker that is not the corner of a tag, tanker frame, m.
     #[must_use]
     pub fn single(&self, id: u32) -> Option<Point3<f64>> {
-        let is_corner = Tag::id_of_corner(id).is_some_and(|tag| self.tag(tag).is_some());
-        if is_corner { None } else { self.get(id) }
+        if self.tag_of_corner(id).is_some() {
+            return None;
+        }
+        self.get(id)
     }
 
     pub(super) fn sorted(
@@ -99,6 +124,7 @@ impl MarkerMap {
         mut markers: Vec<Marker>,
         mut tags: Vec<Tag>,
         budget: MapBudget,
+        points: Vec<NamedPoint>,
     ) -> Self {
         markers.sort_unstable_by_key(|marker| marker.id);
         tags.sort_unstable_by_key(|tag| tag.id);
@@ -107,6 +133,7 @@ impl MarkerMap {
             markers,
             tags,
             budget,
+            points,
         }
     }
 }

@@ -19,6 +19,6 @@ mod tag_file;
 pub use budget::{Flex, MAX_FLEX_MODES, MapBudget};
 pub use check::MAX_COORDINATE_M;
 pub use error::MarkerMapError;
-pub use map::MarkerMap;
+pub use map::{MarkerMap, NamedPoint};
 pub use marker::Marker;
 pub use tag::Tag;

@@ -30,8 +30,15 @@ def built_hash(package: str, name: str) -> str:
     return entry["hash_string"]
 
 
-def test_the_contract_has_four_messages() -> None:
-    assert OURS == ["EstimatorStatus", "FeaturePoint", "FeaturePointArray", "ReceptacleState"]
+def test_the_contract_has_six_messages() -> None:
+    assert OURS == [
+        "EstimatorStatus",
+        "FeaturePoint",
+        "FeaturePointArray",
+        "Integrity",
+        "IntegrityPoint",
+        "ReceptacleState",
+    ]
 
 
 @pytest.mark.parametrize("name", OURS)

@@ -13,8 +13,11 @@ use tanker_pose::config::{
 use tanker_pose::estimation::{
     CalibrationMode, Estimator, EstimatorSettings, Initialisation, Refinement,
 };
+use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::rotation_from_roll_pitch_yaw;
+use tanker_pose::integrity::IntegritySettings;
 use tanker_pose::pipeline::error_budget;
+use tanker_pose::refuelling::{RefuellingSetup, RefuellingSetupError};
 use tanker_pose::target::{MapBudget, MarkerMap};
 use tanker_pose::text_file;
 
@@ -116,6 +119,16 @@ impl EstimatorOptions {
         }
     }
 
+    /// Returns how the camera is turned: optical axes to the receiver's, x ahead, y left, z up.
+    pub fn receiver_from_camera(&self) -> Rotation3<f64> {
+        let mount = turned(
+            self.camera_mount_roll_deg,
+            self.camera_mount_pitch_deg,
+            self.camera_mount_yaw_deg,
+        );
+        mount * flu_from_optical()
+    }
+
     /// Returns what the file of the options says of the calibration, if they name one.
     pub fn calibration_budget(&self) -> Result<Option<CalibrationBudget>, CalibrationError> {
         let Some(path) = &self.calibration_budget_file else {
@@ -141,6 +154,73 @@ impl EstimatorOptions {
         };
         Estimator::new(self.settings()).with_budget(error_budget(of_map, &calibration, of_file))
     }
+}
+
+/// Protection levels; defaults and ranges are those of the node's parameters.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Protection levels")]
+pub struct IntegrityOptions {
+    /// Refuelling setup with the receptacle, the mount's errors and alert limits
+    #[arg(long, value_name = "FILE")]
+    refuelling: Option<PathBuf>,
+    /// Probability with which an error may exceed its level
+    #[arg(long, value_name = "P", default_value_t = KEYS.hmi_probability.default(), value_parser = double(KEYS.hmi_probability))]
+    hmi_probability: f64,
+    /// Probability with which a frame without a fault is declared faulty
+    #[arg(long, value_name = "P", default_value_t = KEYS.false_alert_probability.default(), value_parser = double(KEYS.false_alert_probability))]
+    false_alert_probability: f64,
+    /// Probability that a beacon is faulty, each
+    #[arg(long, value_name = "P", default_value_t = KEYS.beacon_fault_probability.default(), value_parser = double(KEYS.beacon_fault_probability))]
+    beacon_fault_probability: f64,
+    /// Count two faulty beacons at once as unmonitored
+    #[arg(long)]
+    singles_only: bool,
+    /// Probability that a flex mode is beyond its sigma, each
+    #[arg(long, value_name = "P", default_value_t = KEYS.flex_fault_probability.default(), value_parser = double(KEYS.flex_fault_probability))]
+    flex_fault_probability: f64,
+    /// The same for each sigma of the calibration and for jitter
+    #[arg(long, value_name = "P", default_value_t = KEYS.calibration_fault_probability.default(), value_parser = double(KEYS.calibration_fault_probability))]
+    calibration_fault_probability: f64,
+}
+
+impl IntegrityOptions {
+    /// Returns the probabilities, for single frames.
+    pub fn settings(&self) -> IntegritySettings {
+        IntegritySettings {
+            hmi_probability: self.hmi_probability,
+            false_alert_probability: self.false_alert_probability,
+            fault_probability: self.beacon_fault_probability,
+            pairs: !self.singles_only,
+            flex_fault_probability: self.flex_fault_probability,
+            calibration_fault_probability: self.calibration_fault_probability,
+            frames: 1,
+        }
+    }
+
+    /// Returns the refuelling setup, if one is named.
+    pub fn setup(&self) -> Result<Option<RefuellingSetup>, SetupError> {
+        let Some(path) = &self.refuelling else {
+            return Ok(None);
+        };
+        let text = text_file::read(path).map_err(|source| SetupError::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let setup = RefuellingSetup::from_yaml(&text, &path.display().to_string())?;
+        Ok(Some(setup))
+    }
+}
+
+/// Why a refuelling setup cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    #[error("cannot read the refuelling setup {}: {source}", path.display())]
+    Unreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("cannot use the refuelling setup: {0}")]
+    Setup(#[from] RefuellingSetupError),
 }
 
 fn turned(roll_deg: f64, pitch_deg: f64, yaw_deg: f64) -> Rotation3<f64> {
@@ -231,6 +311,8 @@ mod tests {
     struct Line {
         #[command(flatten)]
         estimator: EstimatorOptions,
+        #[command(flatten)]
+        integrity: IntegrityOptions,
     }
 
     #[test]
@@ -242,5 +324,8 @@ mod tests {
         assert!((sigma_px - node.pixel_sigma_px).abs() < f64::EPSILON);
         let margin_px = line.estimator.edge_margin_px;
         assert!((margin_px - node.edge_margin_px).abs() < f64::EPSILON);
+        assert_eq!(line.integrity.settings(), IntegritySettings::default());
+        let turned = line.estimator.receiver_from_camera();
+        assert_eq!(turned, node.receiver_from_camera);
     }
 }

@@ -17,6 +17,7 @@ mod correlated_noise;
 mod frame;
 mod gram;
 mod in_doubt;
+mod linear;
 mod residuals;
 
 use std::collections::BTreeMap;
@@ -31,6 +32,7 @@ pub use causes::{Cause, CauseKind, FrameCauses};
 pub use correlated_noise::{CorrelatedNoise, CorrelatedNoiseError};
 pub(super) use frame::{AttitudePrior, FrameBudget};
 pub(super) use in_doubt::InDoubt;
+pub use linear::LinearFrame;
 
 /// Largest number of modes of calibration and jitter together: all parameters of a calibration, and jitter in u and in
 /// v.
@@ -83,6 +85,7 @@ struct MarkerBudget {
 /// A mode of the image: a weighted sum of the columns of `Camera::pixel_by_calibration`.
 #[derive(Debug, Clone, PartialEq)]
 struct ImageMode {
+    name: String,
     terms: Vec<(usize, f64)>,
 }
 
@@ -188,6 +191,14 @@ impl ErrorBudget {
                 && marker.flex.iter().all(|shift| *shift == Vector3::zeros())
         };
         self.image.is_empty() && self.markers.iter().all(is_exact)
+    }
+
+    /// Returns the name of a mode by its place: flex first, then calibration and jitter.
+    #[must_use]
+    pub fn mode_name(&self, index: usize) -> Option<&str> {
+        let flex = self.flex.iter().map(|mode| mode.name.as_str());
+        flex.chain(self.image.iter().map(|mode| mode.name.as_str()))
+            .nth(index)
     }
 
     /// Returns the flex modes.
@@ -314,13 +325,17 @@ fn image_modes(calibration: &[CalibrationMode], jitter_px: f64) -> Vec<ImageMode
             *jitter = 0.0;
         }
         if !terms.is_empty() {
-            modes.push(ImageMode { terms });
+            modes.push(ImageMode {
+                name: mode.name.clone(),
+                terms,
+            });
         }
     }
     for (axis, sigma) in jitter.into_iter().enumerate() {
         if sigma > 0.0 {
             let terms = vec![(PRINCIPAL_POINT + axis, sigma)];
-            modes.push(ImageMode { terms });
+            let name = ["jitter_u", "jitter_v"][axis].to_owned();
+            modes.push(ImageMode { name, terms });
         }
     }
     modes

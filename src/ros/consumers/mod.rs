@@ -20,7 +20,6 @@ use crate::refuelling::{RefuellingGeometry, RefuellingSetup, RefuellingSetupErro
 use crate::ros::attitude::AttitudeMessage;
 use crate::ros::convert;
 use crate::ros::diagnostics::Tally;
-use crate::ros::health::Unexpected;
 use crate::ros::messages::{DiagnosticStatus, Header, KeyValue};
 use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, RosNode};
@@ -28,7 +27,7 @@ use crate::ros::topics;
 use crate::text;
 use frame::Frame;
 use gated::GatedOutput;
-use silence::Silence;
+pub(in crate::ros) use silence::Silence;
 
 /// Why the outputs cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +64,15 @@ pub fn refuelling_setup(
     let text = crate::text_file::read(&path)
         .map_err(|source| ConsumersError::Unreadable { path, source })?;
     Ok(Some(RefuellingSetup::from_yaml(&text, name)?))
+}
+
+/// Whether protection levels of a frame are available and keep their limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::ros) enum Protection {
+    /// They are.
+    Given,
+    /// They are not, or are not computed.
+    None,
 }
 
 /// The outputs that are on.
@@ -182,12 +190,20 @@ impl Consumers {
         &self.geometry
     }
 
+    /// Returns nothing where outputs may be published with this protection.
+    pub(in crate::ros) fn check(&self, protection: Protection) -> Result<(), Silence> {
+        match protection {
+            Protection::None if self.configuration.require_integrity => Err(Silence::NotProtected),
+            Protection::None | Protection::Given => Ok(()),
+        }
+    }
+
     /// Publishes what follows from a frame's trusted pose, and from the track at its stamp if the frame has corrected
     /// one; or nothing, while the tanker's attitude shows that they would be misread.
-    pub fn on_pose(
+    pub(in crate::ros) fn on_pose(
         &mut self,
         header: &Header,
-        place: Result<(&Solution, Option<&Motion>), Unexpected>,
+        place: Result<(&Solution, Option<&Motion>), Silence>,
         tally: &mut Tally,
     ) {
         let frame = match place {
@@ -208,7 +224,7 @@ impl Consumers {
                     px4_minus_ros_us: self.configuration.px4_minus_ros_us,
                 })
             }
-            Err(unexpected) => Err(Silence::from(unexpected)),
+            Err(silence) => Err(silence),
         };
         for output in &mut self.outputs {
             output.publish(&frame, tally);

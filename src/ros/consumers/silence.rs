@@ -6,7 +6,7 @@ use crate::ros::health::Unexpected;
 
 /// Why an output is held back for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub(super) enum Silence {
+pub(in crate::ros) enum Silence {
     #[error(transparent)]
     Attitude(#[from] AttitudeError),
     #[error(transparent)]
@@ -19,6 +19,8 @@ pub(super) enum Silence {
     NoProbability,
     #[error("{0}: see unexpected_attitude")]
     UnexpectedAttitude(Unexpected),
+    #[error("protection levels are not available, or exceed an alert limit: see integrity")]
+    NotProtected,
 }
 
 impl From<Unexpected> for Silence {

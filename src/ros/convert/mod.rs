@@ -2,6 +2,7 @@
 
 mod apriltags;
 mod flight_stacks;
+mod integrity;
 mod markers;
 mod receptacle;
 mod tools;
@@ -22,6 +23,7 @@ pub use flight_stacks::{
     FlightStackError, imu_attitude, mavros_landing_target, mavros_pose, px4_attitude,
     px4_fiducial_marker, px4_landing_target,
 };
+pub use integrity::integrity;
 pub use markers::markers;
 pub use receptacle::receptacle;
 pub use tools::{camera_info_message, feature_points_message, isometry, pose_message};

@@ -45,6 +45,7 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
         initialisation: Some(Initialisation::Dlt),
         track: FrameTrack::default(),
         causes: None,
+        integrity: None,
         widened_by: 1.0,
     }
 }

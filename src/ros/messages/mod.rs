@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 mod detectors;
 mod estimator_status;
 mod flight_stacks;
+mod integrity;
 mod receptacle_state;
 mod standard;
 mod visualization;
@@ -16,6 +17,7 @@ mod visualization;
 pub use detectors::*;
 pub use estimator_status::EstimatorStatus;
 pub use flight_stacks::*;
+pub use integrity::{Integrity, IntegrityPoint};
 pub use receptacle_state::ReceptacleState;
 pub use ros2_node::messages::*;
 pub use standard::*;
@@ -55,6 +57,7 @@ ros2_node::ros_message!(
     "apriltag_msgs" / AprilTagDetectionArray,
     "tanker_pose" / FeaturePointArray,
     "tanker_pose" / EstimatorStatus,
+    "tanker_pose" / Integrity,
     "tanker_pose" / ReceptacleState,
     "sensor_msgs" / Imu,
     "px4_msgs" / LandingTargetPose,

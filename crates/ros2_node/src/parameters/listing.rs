@@ -103,7 +103,16 @@ fn yaml_value(value: &ParameterValue) -> String {
     match value {
         ParameterValue::Bool(value) => value.to_string(),
         ParameterValue::Integer(value) => value.to_string(),
-        ParameterValue::Double(value) => format!("{value:?}"),
+        ParameterValue::Double(value) => {
+            let text = format!("{value:?}");
+            // Without a dot, YAML 1.1 (PyYAML, which `ros2 param load` uses) takes 1e-7 for a word.
+            match text.split_once('e') {
+                Some((digits, exponent)) if !digits.contains('.') => {
+                    format!("{digits}.0e{exponent}")
+                }
+                _ => text,
+            }
+        }
         // A word such as `tanker` is text in YAML, too; anything else needs quotes to be sure.
         ParameterValue::String(text) if is_plain_word(text) => text.clone(),
         ParameterValue::String(text) => format!("'{}'", text.replace('\'', "''")),

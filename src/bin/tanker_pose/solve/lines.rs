@@ -9,6 +9,8 @@ use tanker_pose::camera::{CameraInfo, RegionOfInterest};
 use tanker_pose::estimation::{Cause, FrameCauses, Solution};
 use tanker_pose::pipeline::{Detection, FrameOutcome};
 
+use super::levels::{Levels, OutputLevels};
+
 /// Outcome of a line that is not a frame.
 const MALFORMED: &str = "malformed";
 
@@ -99,6 +101,8 @@ pub struct OutputFrame {
     numbers: Option<OutputNumbers>,
     #[serde(flatten)]
     causes: Option<OutputCauses>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    integrity: Option<OutputLevels>,
 }
 
 /// Effects of the error budget's causes; only with a budget.
@@ -210,10 +214,12 @@ impl OutputFrame {
             rejected_ids: Vec::new(),
             numbers: None,
             causes: None,
+            integrity: None,
         }
     }
 
-    pub fn new(id: serde_json::Value, outcome: FrameOutcome) -> Self {
+    pub fn new(id: serde_json::Value, outcome: FrameOutcome, levels: Option<Levels>) -> Self {
+        let integrity = levels.zip(outcome.integrity.as_ref());
         Self {
             id,
             outcome: outcome.code().name().to_ascii_lowercase(),
@@ -221,6 +227,7 @@ impl OutputFrame {
             pose: outcome.result.as_ref().ok().map(OutputPose::new),
             numbers: outcome.solution().map(OutputNumbers::new),
             causes: outcome.causes.as_ref().map(OutputCauses::new),
+            integrity: integrity.map(|(levels, found)| levels.output(found)),
             used_ids: outcome.used_ids,
             rejected_ids: outcome.rejected_ids,
         }

@@ -3,6 +3,7 @@
 //! One JSON object a line in, one a line out, in order. A line that cannot be read or solved gives an
 //! output line with its outcome and message, and the next is processed.
 
+mod levels;
 mod lines;
 
 use std::fs::File;
@@ -14,13 +15,15 @@ use indicatif::ProgressBar;
 use nalgebra::{Point3, Rotation3};
 use tanker_pose::camera::{CalibrationBudget, Camera, CameraError, CameraInfo};
 use tanker_pose::estimation::Estimator;
+use tanker_pose::integrity::{IntegrityMonitor, Unavailable};
 use tanker_pose::pipeline::{
-    self, Detection, FrameOutcome, ImageEdges, Refusal, modes_of_file, observe,
+    self, Detection, FrameOutcome, ImageEdges, Refusal, integrity_monitor, modes_of_file, observe,
 };
 use tanker_pose::target::{MAX_COORDINATE_M, MarkerMap};
 
+use self::levels::Levels;
 use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
-use crate::options::{self, CalibrationError, EstimatorOptions};
+use crate::options::{self, CalibrationError, EstimatorOptions, IntegrityOptions, SetupError};
 
 /// Longest line that is read: a frame of ten thousand points.
 const MAX_LINE_BYTES: u64 = 1 << 20;
@@ -43,6 +46,11 @@ pub struct Arguments {
     rectified: bool,
     #[command(flatten)]
     estimator: EstimatorOptions,
+    /// Add protection levels to each line
+    #[arg(long, help_heading = "Protection levels")]
+    protection_levels: bool,
+    #[command(flatten)]
+    integrity: IntegrityOptions,
 }
 
 /// Why the tool as a whole ends; a bad line is not among the reasons.
@@ -57,6 +65,8 @@ pub enum SolveError {
     MarkerMap(String),
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    #[error(transparent)]
+    Setup(#[from] SetupError),
     #[error("cannot read line {number}: it exceeds {limit} bytes")]
     EndlessLine { number: u64, limit: u64 },
     #[error("cannot read the input: {0}")]
@@ -137,6 +147,7 @@ struct Solver {
     edge_margin_px: f64,
     camera: Option<(CameraInfo, Result<Sight, CameraError>)>,
     previous_rotation: Option<Rotation3<f64>>,
+    integrity: Option<IntegrityMonitor>,
 }
 
 impl Solver {
@@ -147,6 +158,12 @@ impl Solver {
             .map(options::marker_map)
             .transpose()
             .map_err(SolveError::MarkerMap)?;
+        let setup = arguments.integrity.setup()?;
+        let integrity = arguments.protection_levels.then(|| {
+            let turned = arguments.estimator.receiver_from_camera();
+            let settings = arguments.integrity.settings();
+            integrity_monitor(settings, &turned, map.as_ref(), setup.as_ref())
+        });
         Ok(Self {
             estimator: arguments.estimator.estimator(map.as_ref(), &[]),
             calibration_budget: arguments.estimator.calibration_budget()?,
@@ -162,6 +179,7 @@ impl Solver {
             edge_margin_px: arguments.estimator.edge_margin_px,
             camera: None,
             previous_rotation: None,
+            integrity,
         })
     }
 
@@ -201,7 +219,7 @@ impl Solver {
         }
         match serde_json::from_slice::<InputFrame>(line) {
             Ok(frame) => match self.solve(&frame) {
-                Ok(outcome) => OutputFrame::new(frame.id, outcome),
+                Ok(outcome) => OutputFrame::new(frame.id, outcome, self.levels()),
                 Err(message) => {
                     OutputFrame::malformed(frame.id, format!("line {number}: {message}"))
                 }
@@ -221,6 +239,13 @@ impl Solver {
                 )
             }
         }
+    }
+
+    /// Returns what writes protection levels, if they are wanted.
+    fn levels(&self) -> Option<Levels<'_>> {
+        let monitor = self.integrity.as_ref()?;
+        let budget = self.estimator.budget();
+        Some(Levels { monitor, budget })
     }
 
     fn solve(&mut self, frame: &InputFrame) -> Result<FrameOutcome, String> {
@@ -256,13 +281,18 @@ impl Solver {
         };
         let (observations, left_out) = edges.leave_out(observations, margin_px);
         let camera = camera.clone();
-        let outcome = pipeline::solve(
+        let mut outcome = pipeline::solve(
             &self.estimator,
             &camera,
             &observations,
             self.previous_rotation.as_ref(),
         )
         .without(left_out);
+        outcome.integrity = self.integrity.as_ref().map(|monitor| {
+            let solution = outcome.result.as_ref().map_err(|_| Unavailable::NoPose)?;
+            let map = self.map.as_ref();
+            monitor.judge(&self.estimator, map, &camera, &observations, solution)
+        });
         if let Ok(solution) = &outcome.result {
             self.previous_rotation =
                 Some(solution.camera_from_tanker.rotation.to_rotation_matrix());
