@@ -1,10 +1,12 @@
 //! `tanker_pose`: tools around the node, one file a subcommand. Those that talk ROS need the feature `ros`.
 
+mod check;
 #[cfg(feature = "ros")]
 mod demo;
 mod options;
 #[cfg(feature = "ros")]
 mod parameters;
+mod plot;
 mod reproduce;
 #[cfg(feature = "ros")]
 mod ros_options;
@@ -44,6 +46,8 @@ enum Tool {
     Watch(watch::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(Box<solve::Arguments>),
+    /// Check marker map, camera and error budget together before flight
+    Check(Box<check::Arguments>),
     /// Reproduce the paper's experiments: tables and plots
     Reproduce(reproduce::Arguments),
 }
@@ -58,6 +62,8 @@ fn main() -> ExitCode {
         Tool::Parameters(arguments) => parameters::run(&arguments).map_err(Into::into),
         #[cfg(feature = "ros")]
         Tool::Watch(arguments) => watch::run(&arguments).map_err(Into::into),
+        // Its exit code also says what it found.
+        Tool::Check(arguments) => return check::run(&arguments),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),
         Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),
     };

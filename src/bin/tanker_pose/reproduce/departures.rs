@@ -14,9 +14,9 @@ use tanker_pose::pipeline::{error_budget, solve};
 use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
 use tanker_pose::target::{Flex, MapBudget, Marker, MarkerMap};
 
-use super::figure::{BLUE, VERMILLION, dashed, solid};
-use super::panel::{Curve, Figure, Line, Marker as Dot, Panel, Style};
-use super::scale::Axis;
+use crate::plot::panel::{Curve, Figure, Line, Marker as Dot, Panel, Style};
+use crate::plot::scale::Axis;
+use crate::plot::style::{BLUE, VERMILLION, dashed, solid};
 
 /// px; stated, and true but where it is the departure.
 const SIGMA_PX: f64 = 0.5;

@@ -1,17 +1,12 @@
 //! Outcomes as figures: which numbers become curves, and how they look.
 
-use plotters::style::{BLACK, RGBColor};
+use plotters::style::BLACK;
 use tanker_pose::simulation::{Method, PAPER_COORDINATES, PAPER_UNITS};
 
 use super::monte_carlo::{Outcome, Point};
-use super::panel::{Curve, Figure, Line, Marker, Panel, Style};
-use super::scale::Axis;
-
-// Okabe and Ito's palette: distinguishable with any colour vision.
-pub const BLUE: RGBColor = RGBColor(0, 114, 178);
-pub const VERMILLION: RGBColor = RGBColor(213, 94, 0);
-pub const GREEN: RGBColor = RGBColor(0, 158, 115);
-pub const PURPLE: RGBColor = RGBColor(204, 121, 167);
+use crate::plot::panel::{Curve, Figure, Panel, Style};
+use crate::plot::scale::Axis;
+use crate::plot::style::{BLUE, GREEN, PURPLE, VERMILLION, dashed, rings, solid, thin};
 
 /// Median of the absolute value of a standard normal number: a median divided by it compares with an RMS.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
@@ -234,36 +229,4 @@ fn over_bound(point: &Point, method: Method) -> f64 {
     point
         .of(method)
         .map_or(f64::NAN, |s| s.rotation_rms_deg / point.bound.rotation_deg)
-}
-
-pub fn solid(color: RGBColor) -> Style {
-    Style {
-        color,
-        line: Line::Solid,
-        marker: Marker::Dot,
-    }
-}
-
-pub fn dashed(color: RGBColor) -> Style {
-    Style {
-        color,
-        line: Line::Dashed,
-        marker: Marker::None,
-    }
-}
-
-fn thin(color: RGBColor) -> Style {
-    Style {
-        color,
-        line: Line::Thin,
-        marker: Marker::None,
-    }
-}
-
-fn rings(color: RGBColor) -> Style {
-    Style {
-        color,
-        line: Line::None,
-        marker: Marker::Ring,
-    }
 }

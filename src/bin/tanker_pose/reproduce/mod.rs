@@ -7,10 +7,8 @@ mod departures;
 mod error;
 mod figure;
 mod monte_carlo;
-mod panel;
 mod report;
 mod run;
-mod scale;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,6 +18,8 @@ use clap::ValueEnum;
 use tanker_pose::simulation::Experiment;
 
 pub use error::ReproduceError;
+
+use crate::plot::panel;
 
 /// Images of the single approach drawn beside Fig. 8.
 const RUN_IMAGES_A_SECOND: f64 = 2.0;

@@ -10,9 +10,9 @@ use tanker_pose::simulation::{
 };
 use tanker_pose::target::MarkerMap;
 
-use super::figure::{BLUE, GREEN, PURPLE, VERMILLION};
-use super::panel::{Curve, Figure, Line, Marker, Panel, Style};
-use super::scale::Axis;
+use crate::plot::panel::{Curve, Figure, Line, Marker, Panel, Style};
+use crate::plot::scale::Axis;
+use crate::plot::style::{BLUE, GREEN, PURPLE, VERMILLION};
 
 /// Stream of the run's noise, different from every experiment's.
 const STREAM: u16 = 100;

@@ -4,7 +4,7 @@
 //! output line with its outcome and message, and the next is processed.
 
 mod levels;
-mod lines;
+pub mod lines;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
@@ -26,7 +26,7 @@ use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
 use crate::options::{self, CalibrationError, EstimatorOptions, IntegrityOptions, SetupError};
 
 /// Longest line that is read: a frame of ten thousand points.
-const MAX_LINE_BYTES: u64 = 1 << 20;
+pub const MAX_LINE_BYTES: u64 = 1 << 20;
 /// What is skipped in search of the end of a longer one.
 const MAX_SKIPPED_BYTES: u64 = 1 << 28;
 
@@ -109,7 +109,11 @@ pub fn run(arguments: &Arguments) -> Result<(), SolveError> {
 
 /// Returns how many bytes the next line has, 0 at the end of the input; of a line that is too long only the beginning
 /// is kept.
-fn read_line(input: &mut impl BufRead, line: &mut Vec<u8>, number: u64) -> Result<u64, SolveError> {
+pub fn read_line(
+    input: &mut impl BufRead,
+    line: &mut Vec<u8>,
+    number: u64,
+) -> Result<u64, SolveError> {
     line.clear();
     let mut bytes = 0;
     loop {
