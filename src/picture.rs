@@ -192,6 +192,7 @@ mod tests {
             chi_squared_limit: 26.1,
             initialisation: Initialisation::Nominal,
             excluded: Excluded::default(),
+            prior: None,
             unclear: Excluded::default(),
         }
     }

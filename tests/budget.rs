@@ -12,7 +12,8 @@ use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector3};
 use support::tanker_markers;
 use tanker_pose::camera::{CalibrationBudget, Camera, CameraInfo, Ray};
 use tanker_pose::estimation::{
-    CauseKind, ErrorBudget, Estimator, EstimatorSettings, Observation, Refinement, Solution,
+    CauseKind, ErrorBudget, Estimator, EstimatorSettings, Expected, Observation, Refinement,
+    Solution,
 };
 use tanker_pose::geometry::skew;
 use tanker_pose::pipeline::modes_of_file;
@@ -282,7 +283,7 @@ fn shares_of_the_causes_add_up_and_a_large_flex_is_found() {
         .estimate(&paper_camera(), &seen, None)
         .expect("a pose");
     let causes = estimator
-        .causes(&paper_camera(), &seen, &found)
+        .causes(&paper_camera(), &seen, &found, &Expected::default())
         .expect("causes");
     let names: Vec<&str> = causes
         .causes

@@ -368,6 +368,7 @@ fn images(seed: u64) -> Vec<(f64, DetectionFrame)> {
                 stamp,
                 frame_id: FRAME_ID.to_owned(),
                 detections: Ok(detections),
+                receiver_from_tanker: None,
             };
             (frame.time_s, frame_of_it)
         })

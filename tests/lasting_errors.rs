@@ -94,6 +94,7 @@ impl Flight {
             stamp,
             frame_id: FRAME_ID.to_owned(),
             detections: Ok(detections),
+            receiver_from_tanker: None,
         })
     }
 

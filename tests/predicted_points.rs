@@ -89,6 +89,7 @@ fn send(pipeline: &mut Pipeline, stamp_ns: i64, detections: Vec<Detection>) -> O
             stamp: stamp(stamp_ns),
             frame_id: FRAME_ID.to_owned(),
             detections: Ok(detections),
+            receiver_from_tanker: None,
         })
         .code()
 }

@@ -102,6 +102,7 @@ impl Flight {
                 },
                 frame_id: FRAME_ID.to_owned(),
                 detections: Ok(frame.detections),
+                receiver_from_tanker: None,
             });
             if let Ok(found) = &outcome.result
                 && index >= FROM_FRAME

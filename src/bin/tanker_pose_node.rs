@@ -20,7 +20,7 @@ Options:
   -V, --version                  print the version
 
 Topics in: camera_info; feature_points, or detections with parameter input; the receiver's attitude, with the outputs
-  for flight stacks that need it. Out: pose, odometry, status, /diagnostics; by parameters /tf, markers, receptacle and
+  for flight stacks that need it; tanker_attitude, with reported_attitude_sigma_deg. Out: pose, odometry, status, /diagnostics; by parameters /tf, markers, receptacle and
   those of PX4 and MAVROS. Services: ~/reset, those of parameters, and with lifecycle those of a managed node.
 Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RUST_LOG.
 All parameters stand with their defaults and comments in config/tanker_pose.yaml.

@@ -4,7 +4,9 @@ use nalgebra::Rotation3;
 
 use super::attitude::expected_attitude;
 use super::table::Values;
-use super::{CalibrationSigmas, ConsumerConfiguration, Input, Parameters, Settings};
+use super::{
+    CalibrationSigmas, ConsumerConfiguration, Input, Parameters, ReportedAttitudeSettings, Settings,
+};
 use crate::estimation::{CorrelatedNoise, EstimatorSettings, Initialisation};
 use crate::geometry::optical_from_body;
 use crate::integrity::IntegritySettings;
@@ -44,6 +46,8 @@ pub struct Configuration {
     pub max_hamming: i32,
     /// Settings of the outputs for refuelling and flight stacks.
     pub consumers: ConsumerConfiguration,
+    /// Farthest that an attitude of the tanker may be from the image, s.
+    pub tanker_attitude_max_age_s: f64,
     /// The mount of the camera and the expected attitude of the tanker.
     pub expected_attitude: ExpectedAttitude,
 }
@@ -68,6 +72,7 @@ impl From<&Parameters> for Configuration {
                 calibration: calibration_sigmas(&values),
                 correlated_noise: correlated_noise(&values),
                 estimator: estimator_settings(&values),
+                reported_attitude: reported_attitude(&values),
                 pixel_sigma_px: values.pixel_sigma_px,
                 edge_margin_px: values.edge_margin_px,
                 widen_by_sigma_factor: values.widen_by_sigma_factor,
@@ -76,6 +81,7 @@ impl From<&Parameters> for Configuration {
                 receiver_from_camera: expected_attitude(&values).receiver_from_camera(),
                 track: values.track.then(|| filter_settings(&values)),
             },
+            tanker_attitude_max_age_s: values.tanker_attitude_max_age_s,
             expected_attitude: expected_attitude(&values),
             consumers: ConsumerConfiguration::from(&values),
             marker_map: values.marker_map,
@@ -117,6 +123,14 @@ fn integrity(values: &Values) -> IntegritySettings {
         calibration_fault_probability: values.calibration_fault_probability,
         frames: values.integrity_frames,
     }
+}
+
+fn reported_attitude(values: &Values) -> Option<ReportedAttitudeSettings> {
+    let sigma_deg = values.reported_attitude_sigma_deg;
+    (sigma_deg > 0.0).then(|| ReportedAttitudeSettings {
+        camera_from_receiver: expected_attitude(values).receiver_from_camera().inverse(),
+        sigma_rad: sigma_deg.to_radians(),
+    })
 }
 
 fn calibration_sigmas(values: &Values) -> CalibrationSigmas {
@@ -253,6 +267,29 @@ mod tests {
     }
 
     #[test]
+    fn a_reported_attitude_passes_through_the_mount_as_the_nominal_one_does() {
+        let mount = [
+            ("camera_mount_roll_deg", Double(3.0)),
+            ("camera_mount_pitch_deg", Double(14.0)),
+            ("camera_mount_yaw_deg", Double(-6.0)),
+            ("reported_attitude_sigma_deg", Double(1.0)),
+            ("nominal_roll_deg", Double(2.0)),
+            ("nominal_pitch_deg", Double(-4.0)),
+            ("nominal_yaw_deg", Double(9.0)),
+        ];
+        let Configuration {
+            settings,
+            expected_attitude,
+            ..
+        } = configuration(&mount);
+        let reported = settings.reported_attitude.expect("a prior");
+        let found = reported.camera_from_receiver * expected_attitude.nominal.rotation();
+        let expected = settings.estimator.nominal_camera_from_tanker;
+        assert!((found.matrix() - expected.matrix()).norm() < 1e-14);
+        assert_eq!(configuration(&[]).settings.reported_attitude, None);
+    }
+
+    #[test]
     fn every_parameter_reaches_its_setting() {
         let found = configuration(&[
             ("marker_map", String("fin6".into())),
@@ -275,6 +312,8 @@ mod tests {
             ("trust_probability", Double(0.95)),
             ("max_ambiguity", Double(0.5)),
             ("nominal_attitude_sigma_deg", Double(6.0)),
+            ("reported_attitude_sigma_deg", Double(2.0)),
+            ("tanker_attitude_max_age_s", Double(0.3)),
             ("focal_length_sigma", Double(0.003)),
             ("principal_point_sigma_px", Double(3.0)),
             ("k1_sigma", Double(0.02)),
@@ -313,6 +352,9 @@ mod tests {
         assert!((estimator.max_ambiguity - 0.5).abs() < f64::EPSILON);
         let sigma = estimator.attitude_sigma_rad.expect("a prior");
         assert!((sigma.to_degrees() - 6.0).abs() < 1e-12);
+        let reported = found.settings.reported_attitude.expect("a prior");
+        assert!((reported.sigma_rad.to_degrees() - 2.0).abs() < 1e-12);
+        assert!((found.tanker_attitude_max_age_s - 0.3).abs() < f64::EPSILON);
         let calibration = CalibrationSigmas {
             focal_length: 0.003,
             principal_point_px: 3.0,

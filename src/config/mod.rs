@@ -20,7 +20,7 @@ pub use people::{parameter_file, parameter_tables};
 pub use ros2_node::parameters::{
     Key, Kind, ParameterError, ParameterSpec, ParameterValue, Parameters, Words,
 };
-pub use settings::{CalibrationSigmas, Settings};
+pub use settings::{CalibrationSigmas, ReportedAttitudeSettings, Settings};
 pub use table::{KEYS, Keys, SECTIONS, TABLE};
 pub use words::{Attitude, AttitudeSource, Input};
 
@@ -62,6 +62,12 @@ pub fn check_together(parameters: &Parameters) -> Result<(), TogetherError> {
             refinement: KEYS.refinement.name(),
         });
     }
+    if values.reported_attitude_sigma_deg > 0.0 && values.attitude.0.is_none() {
+        return Err(TogetherError::NoReceiverAttitude {
+            sigma: KEYS.reported_attitude_sigma_deg.name(),
+            needs: KEYS.attitude.name(),
+        });
+    }
     Ok(ConsumerConfiguration::from(&values).check()?)
 }
 
@@ -95,5 +101,15 @@ pub enum TogetherError {
         output: &'static str,
         /// The parameter that chooses the estimate.
         refinement: &'static str,
+    },
+    /// Only one of two attitudes is given.
+    #[error(
+        "{sigma} above 0 needs the parameter {needs:?}, which is \"none\": the receiver's attitude"
+    )]
+    NoReceiverAttitude {
+        /// A standard deviation above 0.
+        sigma: &'static str,
+        /// The parameter that is missing.
+        needs: &'static str,
     },
 }

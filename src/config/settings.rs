@@ -15,6 +15,8 @@ pub struct Settings {
     pub pixel_sigma_px: f64,
     /// Detections closer than this to the edge of the image are left out, px; 0: no margin.
     pub edge_margin_px: f64,
+    /// How attitudes that both aircraft report are taken; `None`: not at all.
+    pub reported_attitude: Option<ReportedAttitudeSettings>,
     /// Standard deviations of the calibration's errors.
     pub calibration: CalibrationSigmas,
     /// Whether to multiply the sigmas of detections by the factor by which the scatter of residuals exceeds them.
@@ -29,6 +31,15 @@ pub struct Settings {
     pub receiver_from_camera: Rotation3<f64>,
     /// Track settings; `None` disables tracking.
     pub track: Option<CheckedFilterSettings>,
+}
+
+/// What turns the attitudes that both aircraft report into a prior.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReportedAttitudeSettings {
+    /// The camera's mount: the receiver's axes (x forward, y left, z up) to the optical ones.
+    pub camera_from_receiver: Rotation3<f64>,
+    /// Standard deviation of both attitudes and the mount together, about each axis, rad.
+    pub sigma_rad: f64,
 }
 
 /// Standard deviations of the calibration and of image jitter; 0: no error.

@@ -100,6 +100,12 @@ ros2_node::declare_parameters! {
         /// standard deviation of the tanker's attitude about the nominal one, each axis; it distinguishes a flat target
         /// from its mirror image; 0: no prior
         nominal_attitude_sigma_deg: f64 = double(0.0, [0.0, 45.0]).unit("deg");
+        /// standard deviation of the tanker's attitude in the receiver as both aircraft report it (attitude, and topic
+        /// tanker_attitude with sensor_msgs/Imu, ENU), each axis: both attitudes and the camera's mount together; where
+        /// both have an attitude for an image, it is the frame's prior in place of the nominal one; 0: not used
+        reported_attitude_sigma_deg: f64 = double(0.0, [0.0, 45.0]).unit("deg").fixed();
+        /// farthest that an attitude of the tanker may be from the image, and two of them from each other
+        tanker_attitude_max_age_s: f64 = double(0.2, [0.001, 1.0]).unit("s").fixed();
         /// relative standard deviation of the focal length: 0.003 is 0.3 %; 0: the calibration is exact
         focal_length_sigma: f64 = double(0.0, [0.0, 0.1]);
         /// standard deviation of each coordinate of the principal point
@@ -189,7 +195,7 @@ ros2_node::declare_parameters! {
         /// source of the receiver's attitude: none, /fmu/out/vehicle_attitude (px4_msgs/VehicleAttitude) or
         /// /mavros/imu/data (sensor_msgs/Imu, ENU)
         attitude: Attitude = one_of().fixed();
-        /// largest time difference between an attitude and the image, and between two attitudes
+        /// largest time difference between an attitude of the receiver and the image, and between two attitudes
         attitude_max_age_s: f64 = double(0.05, [0.001, 1.0]).unit("s").fixed();
         /// standard deviation of the receiver's attitude on each axis; the covariances in the messages are not used
         attitude_sigma_deg: f64 = double(1.0, [0.001, 30.0]).unit("deg").fixed();

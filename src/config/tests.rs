@@ -79,6 +79,23 @@ fn a_calibration_has_its_sigmas_from_a_file_or_from_parameters() {
     }
 }
 
+#[test]
+fn a_reported_attitude_needs_that_of_the_receiver() {
+    let mut parameters = Parameters::new(TABLE);
+    let mut set = |name, value| {
+        parameters.set(name, value).expect("allowed by itself");
+        check_together(&parameters)
+    };
+    let sigma = ParameterValue::Double(2.0);
+    let refused = set("reported_attitude_sigma_deg", sigma).expect_err("no attitude");
+    let words = r#"reported_attitude_sigma_deg above 0 needs the parameter "attitude""#;
+    assert!(refused.to_string().contains(words), "{refused}");
+    for source in ["px4", "imu"] {
+        let source = ParameterValue::String(source.into());
+        assert_eq!(set("attitude", source), Ok(()));
+    }
+}
+
 /// The compiler is silent about fields of `Values` that nothing reads: they come from a macro of another crate.
 #[test]
 fn every_parameter_is_used() {

@@ -6,17 +6,21 @@ use nalgebra::{Point3, Rotation3, UnitQuaternion};
 use smallvec::SmallVec;
 
 use super::ambiguity::{self, is_same, likelihood_ratio};
-use super::budget::{self, AttitudePrior, ErrorBudget, FrameBudget, FrameCauses, LinearFrame};
+use super::budget::{
+    self, AttitudePrior, CauseKind, ErrorBudget, FrameBudget, FrameCauses, LinearFrame,
+};
 use super::exclude::Found;
 use super::initialise::{self, linear_rotation};
 use super::lanes::points::{INLINE_POINTS, mean};
+use super::prior_agreement::prior_agreement;
 use super::problem::{NEGLIGIBLE, Problem, Room};
 use super::redundancy::{count_checking, with_sigma_floor};
 use super::refine::Fit;
 use super::trust::TrustLimits;
 use super::widen::honest_covariance;
 use super::{
-    EstimateError, EstimatorSettings, Excluded, Initialisation, Observation, Refinement, Solution,
+    EstimateError, EstimatorSettings, Excluded, Expected, Initialisation, Observation, Refinement,
+    Solution,
 };
 use crate::camera::{Camera, Ray};
 
@@ -68,7 +72,8 @@ impl Estimator {
         self.budget.as_ref()
     }
 
-    /// Returns whether errors other than the noise of detections are stated: a budget, or a prior of the attitude.
+    /// Returns whether errors beside the noise of detections are stated for every frame: a budget, or a prior about the
+    /// nominal attitude.
     #[must_use]
     pub fn has_causes(&self) -> bool {
         self.budget.is_some() || self.settings.attitude_sigma_rad.is_some()
@@ -92,27 +97,30 @@ impl Estimator {
     /// for an estimate that is not maximum likelihood.
     ///
     /// # Inputs
-    /// * `observations`: those that the solution was estimated from.
+    /// * `observations`, `expected`: those that the solution was estimated from.
     #[must_use]
     pub fn causes(
         &self,
         camera: &Camera,
         observations: &[Observation],
         solution: &Solution,
+        expected: &Expected,
     ) -> Option<FrameCauses> {
         if self.settings.refinement != Refinement::MaximumLikelihood {
             return None;
         }
         let floored = with_sigma_floor(observations, self.settings.min_points);
         let observations = floored.as_deref().unwrap_or(observations);
-        let information = self.attitude_prior().map_or(0.0, |prior| prior.information);
-        budget::frame_causes(
-            self.budget.as_ref(),
-            information,
-            camera,
-            observations,
-            solution,
-        )
+        let (is_reported, prior) = (expected.reported.is_some(), self.attitude_prior(expected));
+        let prior = prior.map(|prior| {
+            let kind = if is_reported {
+                CauseKind::ReportedAttitude
+            } else {
+                CauseKind::Attitude
+            };
+            (kind, prior.information)
+        });
+        budget::frame_causes(self.budget.as_ref(), prior, camera, observations, solution)
     }
 
     /// Returns a frame linearised at its solution, without the points that it leaves out; `None` for an estimate that
@@ -136,16 +144,27 @@ impl Estimator {
             .unwrap_or(observations)
             .iter()
             .filter(|seen| !solution.excluded.contains(seen.id));
-        let information = self.attitude_prior().map_or(0.0, |prior| prior.information);
+        let information = solution.prior.map_or(0.0, |prior| prior.information);
         let pose = &solution.camera_from_tanker;
         LinearFrame::new(self.budget.as_ref(), information, camera, used, pose)
     }
 
-    fn attitude_prior(&self) -> Option<AttitudePrior> {
-        self.settings.attitude_sigma_rad.map(|sigma| AttitudePrior {
-            camera_from_tanker: self.settings.nominal_camera_from_tanker,
-            information: sigma.powi(-2),
+    /// Returns the prior of a frame: about what both aircraft report, or else about the nominal attitude.
+    fn attitude_prior(&self, expected: &Expected) -> Option<AttitudePrior> {
+        let reported = expected.reported.map(|reported| reported.sigma_rad);
+        let sigma_rad = reported.or(self.settings.attitude_sigma_rad)?;
+        Some(AttitudePrior {
+            camera_from_tanker: *self.likely_rotation(expected),
+            information: sigma_rad.powi(-2),
         })
+    }
+
+    /// Returns the attitude that both aircraft report, or else the nominal one.
+    fn likely_rotation<'a>(&'a self, expected: &'a Expected) -> &'a Rotation3<f64> {
+        match &expected.reported {
+            Some(reported) => &reported.camera_from_tanker,
+            None => &self.settings.nominal_camera_from_tanker,
+        }
     }
 
     /// Returns the settings.
@@ -176,10 +195,27 @@ impl Estimator {
         observations: &[Observation],
         previous: Option<&Rotation3<f64>>,
     ) -> Result<Solution, EstimateError> {
+        let expected = Expected {
+            previous,
+            reported: None,
+        };
+        self.estimate_expecting(camera, observations, &expected)
+    }
+
+    /// The same as [`Self::estimate`] with all that may be known of the frame's attitude.
+    ///
+    /// # Errors
+    /// As [`Self::estimate`].
+    pub fn estimate_expecting(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+        expected: &Expected,
+    ) -> Result<Solution, EstimateError> {
         self.check_count(observations)?;
         let floored = with_sigma_floor(observations, self.settings.min_points);
         let observations = floored.as_deref().unwrap_or(observations);
-        let mut estimate = self.estimate_with_all(camera, observations, previous);
+        let mut estimate = self.estimate_with_all(camera, observations, expected);
         let is_final = match &estimate {
             Ok(solution) => solution.is_trusted(),
             // A pixel outside the lens model is an invalid input, not a wrong detection.
@@ -187,7 +223,7 @@ impl Estimator {
         };
         if !is_final && self.settings.max_outliers > 0 {
             let of_all = estimate.as_ref().ok();
-            match self.leave_out(camera, observations, previous, of_all) {
+            match self.leave_out(camera, observations, expected, of_all) {
                 Found::Solution(mut of_others) => {
                     of_others.chi_squared_of_all =
                         of_all.map_or(f64::INFINITY, |of_all| of_all.chi_squared);
@@ -228,15 +264,16 @@ impl Estimator {
         &self,
         camera: &Camera,
         observations: &[Observation],
-        previous: Option<&Rotation3<f64>>,
+        expected: &Expected,
     ) -> Result<Solution, EstimateError> {
         let is_exact = self.budget.as_ref().is_none_or(ErrorBudget::is_empty);
-        if !is_exact || self.settings.attitude_sigma_rad.is_some() {
-            return self.estimate_in_doubt(camera, observations, previous);
+        let prior = self.attitude_prior(expected);
+        if !is_exact || prior.is_some() {
+            return self.estimate_in_doubt(camera, observations, expected);
         }
         let mut room = Room::new();
         let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
-        self.solve(&problem, previous)
+        self.solve(&problem, expected)
     }
 
     /// As [`Self::estimate_with_all`], with a budget; separate because of its stack space.
@@ -245,27 +282,23 @@ impl Estimator {
         &self,
         camera: &Camera,
         observations: &[Observation],
-        previous: Option<&Rotation3<f64>>,
+        expected: &Expected,
     ) -> Result<Solution, EstimateError> {
         let mut room = Room::new();
-        let mut doubts = FrameBudget::new(self.attitude_prior());
+        let mut doubts = FrameBudget::new(self.attitude_prior(expected));
         let problem = Problem::new(camera, self.settings.refinement, observations, &mut room)?;
         doubts.fill(self.budget.as_ref(), camera, observations, &problem.points);
-        self.solve(&problem.in_doubt(&doubts), previous)
+        self.solve(&problem.in_doubt(&doubts), expected)
     }
 
     #[inline(always)]
-    fn solve(
-        &self,
-        problem: &Problem,
-        previous: Option<&Rotation3<f64>>,
-    ) -> Result<Solution, EstimateError> {
+    fn solve(&self, problem: &Problem, expected: &Expected) -> Result<Solution, EstimateError> {
         let start = self.settings.initialisation;
         let nominal = || {
-            let seed = &self.settings.nominal_camera_from_tanker;
+            let seed = self.likely_rotation(expected);
             self.solve_from(problem, seed, Initialisation::Nominal)
         };
-        match (start, previous) {
+        match (start, expected.previous) {
             (Initialisation::Previous, Some(seed)) => {
                 match self.solve_from(problem, seed, start) {
                     Ok(solution) if solution.is_trusted() => Ok(solution),
@@ -368,6 +401,7 @@ impl Estimator {
             initialisation: judged.initialisation,
             ambiguity: judged.ambiguity,
             excluded: Excluded::default(),
+            prior: prior_agreement(problem, fit, &self.limits),
             unclear: Excluded::default(),
         })
     }

@@ -27,6 +27,7 @@ mod initialise;
 mod lanes;
 mod newton;
 mod orthogonal_iteration;
+mod prior_agreement;
 mod problem;
 mod redundancy;
 mod refine;
@@ -121,6 +122,24 @@ impl Default for EstimatorSettings {
     }
 }
 
+/// The attitude that both aircraft report for the time of an image: a normal distribution, the same about every axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReportedAttitude {
+    /// Rotation part of `camera_from_tanker`.
+    pub camera_from_tanker: Rotation3<f64>,
+    /// Standard deviation about each axis, rad; finite and above zero.
+    pub sigma_rad: f64,
+}
+
+/// What is known of one frame's attitude before its image is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Expected<'a> {
+    /// The last trusted rotation of `camera_from_tanker`, used by [`Initialisation::Previous`] only.
+    pub previous: Option<&'a Rotation3<f64>>,
+    /// What both aircraft report. It stands in for the nominal attitude of the settings and for the prior about it.
+    pub reported: Option<ReportedAttitude>,
+}
+
 /// The observation of one marker in an image. Values are checked by the caller: finite, `sigma_px > 0`, ids unique.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
@@ -180,6 +199,8 @@ pub struct Solution {
     pub excluded: Excluded,
     /// `chi_squared` of the fit of all points, before any exclusion; infinite if they have no fit.
     pub chi_squared_of_all: f64,
+    /// How it agrees with the prior of the attitude, if there is one.
+    pub prior: Option<PriorAgreement>,
     /// Two points of which either may be wrong; empty unless the frame is unclear.
     pub unclear: Excluded,
 }
@@ -199,10 +220,32 @@ impl Solution {
         (self.chi_squared_of_all, degrees_of_freedom)
     }
 
-    /// Returns whether the residuals agree with the sigmas.
+    /// Returns whether the residuals are as small as the sigmas promise, and image and prior agree.
     #[must_use]
     pub fn is_trusted(&self) -> bool {
         self.chi_squared <= self.chi_squared_limit
+            && self.prior.as_ref().is_none_or(PriorAgreement::agrees)
+    }
+}
+
+/// How an estimate agrees with the prior of its attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PriorAgreement {
+    /// Of the prior about each axis, 1/rad².
+    pub information: f64,
+    /// How far the estimate is turned from the prior, rad.
+    pub turn_rad: f64,
+    /// The square of that turn over its covariance: a chi-squared variable if prior and image are as stated.
+    pub chi_squared: f64,
+    /// The largest to trust.
+    pub limit: f64,
+}
+
+impl PriorAgreement {
+    /// Returns whether they agree.
+    #[must_use]
+    pub fn agrees(&self) -> bool {
+        self.chi_squared <= self.limit
     }
 }
 

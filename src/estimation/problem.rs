@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Rotation3};
 
-use super::budget::{FrameBudget, InDoubt};
+use super::budget::{AttitudePrior, FrameBudget, InDoubt};
 use super::centred_pose::CentredPose;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
@@ -146,6 +146,12 @@ impl<'a> Problem<'a> {
     /// Returns the degrees of freedom of the residuals, including those of a prior.
     pub(crate) fn degrees_of_freedom(&self) -> usize {
         2 * self.observations.len() - 6 + self.doubts.map_or(0, FrameBudget::degrees_of_freedom)
+    }
+
+    /// Returns the prior of the attitude, if there is one.
+    #[inline(always)]
+    pub(crate) fn attitude_prior(&self) -> Option<&AttitudePrior> {
+        self.doubts?.attitude()
     }
 
     /// Returns the step length, rad, at which a minimum of the cost is accurate enough.

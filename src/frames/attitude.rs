@@ -1,4 +1,4 @@
-//! The receiver's attitude at the time of an image, interpolated between samples of an autopilot.
+//! An aircraft's attitude at the time of an image, interpolated between samples of its autopilot.
 
 use std::collections::VecDeque;
 
@@ -39,13 +39,13 @@ pub struct AttitudeAt {
 #[non_exhaustive]
 pub enum AttitudeError {
     /// Too few samples for a rate.
-    #[error("need 2 samples of the receiver's attitude, got {got}")]
+    #[error("need 2 samples of the attitude, got {got}")]
     TooFew {
         /// Samples since the start or the last restart.
         got: usize,
     },
     /// The newest sample is too old for the image.
-    #[error("the receiver's attitude is {age_s:.3} s older than the image, allowed is {limit_s} s")]
+    #[error("its newest sample is {age_s:.3} s older than the image, allowed is {limit_s} s")]
     Stale {
         /// s.
         age_s: f64,
@@ -54,7 +54,7 @@ pub enum AttitudeError {
     },
     /// The newest sample is so much later than the image that their clocks do not agree.
     #[error(
-        "the newest attitude of the receiver is {by_s:.3} s later than the image, allowed is {limit_s} s: the clocks do not agree, or the image comes late"
+        "its newest sample is {by_s:.3} s later than the image, allowed is {limit_s} s: the clocks do not agree, or the image comes late"
     )]
     Ahead {
         /// s.
@@ -63,13 +63,13 @@ pub enum AttitudeError {
         limit_s: f64,
     },
     /// All samples are later than the image.
-    #[error("the first attitude of the receiver is {by_s:.3} s later than the image")]
+    #[error("its first sample is {by_s:.3} s later than the image")]
     BeforeFirst {
         /// s.
         by_s: f64,
     },
     /// The two samples around the image are too far apart.
-    #[error("{gap_s:.3} s between two attitudes of the receiver, allowed is {limit_s} s")]
+    #[error("{gap_s:.3} s between two samples, allowed is {limit_s} s")]
     Gap {
         /// s.
         gap_s: f64,
@@ -77,9 +77,7 @@ pub enum AttitudeError {
         limit_s: f64,
     },
     /// The two samples around the image imply a rate that no aircraft has.
-    #[error(
-        "the receiver's attitude turns at {rate_radps:.1} rad/s, allowed is {limit_radps} rad/s"
-    )]
+    #[error("it turns at {rate_radps:.1} rad/s, allowed is {limit_radps} rad/s")]
     Jump {
         /// rad/s.
         rate_radps: f64,

@@ -1,5 +1,7 @@
 //! The detections of one image.
 
+use nalgebra::Rotation3;
+
 use super::{Refusal, Stamp};
 
 /// A detected beacon in an image, unchecked.
@@ -24,4 +26,7 @@ pub struct DetectionFrame {
     pub frame_id: String,
     /// The detections, in any order; or why they cannot be read.
     pub detections: Result<Vec<Detection>, Refusal>,
+    /// The tanker's attitude in the receiver as both report it for the stamp, axes x forward, y left, z up; used where
+    /// [`Settings::reported_attitude`](crate::config::Settings::reported_attitude) says how well it is known.
+    pub receiver_from_tanker: Option<Rotation3<f64>>,
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::estimation::{CauseKind, FrameCauses, Solution};
+use crate::estimation::{Cause, CauseKind, FrameCauses, Solution};
 use crate::geometry::{PoseCovariance, principal_root};
 use crate::tracking::LastingError;
 
@@ -23,6 +23,7 @@ const ATTITUDE: u64 = 3 << 40;
 const NOISE: u64 = 4 << 40;
 const UNDIVIDED: u64 = 5 << 40;
 const WIDENING: u64 = 6 << 40;
+const REPORTED_ATTITUDE: u64 = 7 << 40;
 /// Least widening that is taken into account, relative to the variance in any direction. The causes are linearised at
 /// another point than the covariance, so their sum differs from it by about a percent.
 const LEAST_WIDENING: f64 = 0.05;
@@ -75,8 +76,15 @@ impl FrameErrors {
                 });
             }
         }
+        // What the aircraft report is wrong in another way than the nominal attitude is.
+        let is_reported = |cause: &Cause| cause.kind == CauseKind::ReportedAttitude;
+        let prior = if causes.causes.iter().any(is_reported) {
+            REPORTED_ATTITUDE
+        } else {
+            ATTITUDE
+        };
         for (axis, shift) in (0..).zip(causes.attitude_shifts.iter().flatten()) {
-            lasting.push(constant(ATTITUDE + axis, shift));
+            lasting.push(constant(prior + axis, shift));
         }
         // All frames have the same modes in the same order, but a frame may lack markers with a survey error.
         let mut mode = MODE;
@@ -157,7 +165,6 @@ fn constant(cause: u64, shift: &Vector6<f64>) -> LastingError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::Cause;
 
     fn cause(kind: CauseKind, shift: Option<f64>) -> Cause {
         Cause {
@@ -204,6 +211,24 @@ mod tests {
         assert_eq!(with.len(), 2);
         assert_ne!(with[0].0, with[1].0);
         assert_eq!(with, number(None));
+    }
+
+    #[test]
+    fn errors_of_the_nominal_and_of_the_reported_attitude_are_different_ones() {
+        let numbers = [CauseKind::Attitude, CauseKind::ReportedAttitude].map(|kind| {
+            let causes = FrameCauses {
+                causes: vec![cause(CauseKind::Noise, None), cause(kind, None)],
+                survey_shifts: Vec::new(),
+                noise_shifts: Vec::new(),
+                attitude_shifts: Some([0.1, 0.2, 0.3].map(Vector6::from_element)),
+            };
+            let whole = PoseCovariance(Matrix6::identity() * 2.0);
+            let lasting = FrameErrors::of(&causes, &whole).lasting;
+            lasting.iter().map(|error| error.cause).collect::<Vec<_>>()
+        });
+        let [nominal, reported] = &numbers;
+        assert_eq!((nominal.len(), reported.len()), (3, 3));
+        assert!(nominal.iter().all(|number| !reported.contains(number)));
     }
 
     #[test]

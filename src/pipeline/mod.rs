@@ -36,7 +36,8 @@ use nalgebra::Rotation3;
 use crate::camera::{CalibrationBudget, Camera, CameraError, CameraInfo, OffCentre};
 use crate::config::Settings;
 use crate::estimation::{
-    CalibrationMode, ErrorBudget, EstimateError, Estimator, Initialisation, Observation,
+    CalibrationMode, ErrorBudget, EstimateError, Estimator, Expected, Initialisation, Observation,
+    ReportedAttitude,
 };
 use crate::integrity::{IntegrityMonitor, Unavailable};
 use crate::refuelling::RefuellingSetup;
@@ -199,6 +200,10 @@ impl Pipeline {
         if !settings.widen_by_sigma_factor {
             self.widening.forget();
         }
+        if settings.reported_attitude != self.settings.reported_attitude {
+            // The mount is part of the reported attitude's error.
+            self.tracker.reset();
+        }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
         self.integrity = monitor(&self.settings, &self.map, self.setup.as_ref());
@@ -315,7 +320,7 @@ impl Pipeline {
         if self.integrity.is_some() && outcome.result.is_err() {
             outcome.integrity = Some(Err(Unavailable::NoPose));
         }
-        let has_causes = self.estimator.has_causes();
+        let has_causes = self.estimator.has_causes() || self.reported_attitude(frame).is_some();
         self.tracker.follow(frame.stamp, &mut outcome, has_causes);
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {
@@ -344,7 +349,11 @@ impl Pipeline {
             None => (observations, LeftOut::default()),
         };
         let previous = self.expected_rotation(frame.stamp);
-        let mut outcome = solve(&self.estimator, camera, &observations, previous.as_ref());
+        let expected = Expected {
+            previous: previous.as_ref(),
+            reported: self.reported_attitude(frame),
+        };
+        let mut outcome = solve_expecting(&self.estimator, camera, &observations, &expected);
         outcome.widened_by = widened_by;
         if let (Some(monitor), Ok(solution)) = (&self.integrity, &outcome.result) {
             let levels = monitor.judge(
@@ -357,6 +366,15 @@ impl Pipeline {
             outcome.integrity = Some(levels);
         }
         Ok(outcome.without(left_out))
+    }
+
+    /// Returns the prior of a frame whose attitude both aircraft report, if that is used.
+    fn reported_attitude(&self, frame: &DetectionFrame) -> Option<ReportedAttitude> {
+        let settings = self.settings.reported_attitude?;
+        Some(ReportedAttitude {
+            camera_from_tanker: settings.camera_from_receiver * frame.receiver_from_tanker?,
+            sigma_rad: settings.sigma_rad,
+        })
     }
 
     /// Records how the residuals of a fit differ from earlier ones.
@@ -447,15 +465,36 @@ pub fn solve(
     observations: &[Observation],
     previous: Option<&Rotation3<f64>>,
 ) -> FrameOutcome {
+    let expected = Expected {
+        previous,
+        reported: None,
+    };
+    solve_expecting(estimator, camera, observations, &expected)
+}
+
+/// The same as [`solve`] with all that may be known of the frame's attitude.
+#[must_use]
+pub fn solve_expecting(
+    estimator: &Estimator,
+    camera: &Camera,
+    observations: &[Observation],
+    expected: &Expected,
+) -> FrameOutcome {
     let asked = estimator.settings().initialisation;
-    match estimator.estimate(camera, observations, previous) {
+    match estimator.estimate_expecting(camera, observations, expected) {
         Ok(solution) => {
-            let causes = estimator
-                .has_causes()
-                .then(|| estimator.causes(camera, observations, &solution))
+            let has_causes = estimator.has_causes() || expected.reported.is_some();
+            let causes = has_causes
+                .then(|| estimator.causes(camera, observations, &solution, expected))
                 .flatten();
             let settings = estimator.settings();
-            let mut outcome = FrameOutcome::judged(solution, camera, observations, settings);
+            let mut outcome = FrameOutcome::judged(
+                solution,
+                camera,
+                observations,
+                settings,
+                expected.reported.is_some(),
+            );
             outcome.causes = causes;
             outcome
         }

@@ -4,7 +4,8 @@ use super::residuals::{MarkerResidual, residuals};
 use super::{FrameTrack, LeftOut, OutcomeCode, Refusal};
 use crate::camera::Camera;
 use crate::estimation::{
-    EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, Solution,
+    EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, PriorAgreement,
+    Solution,
 };
 use crate::integrity::{FrameIntegrity, Unavailable};
 
@@ -59,6 +60,7 @@ impl FrameOutcome {
         camera: &Camera,
         observations: &[Observation],
         settings: &EstimatorSettings,
+        is_reported: bool,
     ) -> Self {
         let (rejected_ids, used_ids) = observations
             .iter()
@@ -66,7 +68,7 @@ impl FrameOutcome {
             .partition(|&id| solution.excluded.contains(id));
         let initialisation = Some(solution.initialisation);
         let residuals = residuals(&solution, camera, observations);
-        let (result, doubtful) = match doubt(&solution, settings) {
+        let (result, doubtful) = match doubt(&solution, settings, is_reported) {
             Some(refusal) => (Err(refusal), Some(solution)),
             None => (Ok(solution), None),
         };
@@ -142,7 +144,23 @@ impl FrameOutcome {
 /// degrees; up to this the true error follows the covariance, beyond it the projection is too nonlinear.
 const MAX_ATTITUDE_SIGMA_DEG: f64 = 10.0;
 
-fn doubt(solution: &Solution, settings: &EstimatorSettings) -> Option<Refusal> {
+fn doubt(solution: &Solution, settings: &EstimatorSettings, is_reported: bool) -> Option<Refusal> {
+    // The prior is to blame where the points agree without it.
+    let is_to_blame = |prior: &PriorAgreement| {
+        !prior.agrees() && solution.chi_squared - prior.chi_squared <= solution.chi_squared_limit
+    };
+    if let Some(prior) = solution.prior.filter(is_to_blame) {
+        return Some(Refusal::ContradictsPrior {
+            prior: if is_reported {
+                "what both aircraft report"
+            } else {
+                "the nominal attitude"
+            },
+            turn_deg: prior.turn_rad.to_degrees(),
+            chi_squared: prior.chi_squared,
+            limit: prior.limit,
+        });
+    }
     if !solution.is_trusted() {
         return Some(Refusal::NotTrusted {
             chi_squared: solution.chi_squared,

@@ -146,6 +146,21 @@ pub enum Refusal {
         /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
         unclear: Vec<u32>,
     },
+    /// Image and prior of the attitude contradict each other.
+    #[error(
+        "expected the attitude near its prior ({prior}), but the image shows it {turn_deg:.1}° off: chi-squared {chi_squared:.2}, limit {limit:.2}; \
+         a wrong prior, a wrong camera_mount, or a wrong detection?"
+    )]
+    ContradictsPrior {
+        /// What the prior is about.
+        prior: &'static str,
+        /// From the prior to the best fit, degrees; of the image alone it is more.
+        turn_deg: f64,
+        /// Of that turn.
+        chi_squared: f64,
+        /// The largest to trust.
+        limit: f64,
+    },
     /// The frame shows a marker that is excluded too often for occasional wrong detections.
     #[error("expected markers to be left out only occasionally, but {0}")]
     SuspectMarker(SuspectMarker),
@@ -182,7 +197,9 @@ impl Refusal {
             Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
             Self::Estimate(error) => code_of(error),
             Self::TooUncertain { .. } => OutcomeCode::DegenerateGeometry,
-            Self::NotTrusted { .. } | Self::SuspectMarker(_) => OutcomeCode::NotTrusted,
+            Self::NotTrusted { .. } | Self::ContradictsPrior { .. } | Self::SuspectMarker(_) => {
+                OutcomeCode::NotTrusted
+            }
             Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
         }
     }

@@ -1,4 +1,4 @@
-//! The topic of the receiver's attitude, of one of two types.
+//! The topics of attitudes: the receiver's, of one of two types, and the tanker's.
 
 use std::pin::Pin;
 
@@ -8,7 +8,7 @@ use ros2_client::{ReadError, Subscription};
 
 use super::messages::{Imu, VehicleAttitude};
 use super::participant::{EndpointError, RosNode};
-use super::topics::Topic;
+use super::topics::{self, Topic};
 use crate::config::AttitudeSource;
 
 /// One sample, as a flight stack sends it.
@@ -35,7 +35,19 @@ pub type AttitudeStream<'a> =
     Pin<Box<dyn FusedStream<Item = Result<AttitudeMessage, ReadError>> + 'a>>;
 
 impl AttitudeSubscription {
-    /// Returns the subscription to the source's topic.
+    /// Returns the subscription to the tanker's attitude, if it is wanted.
+    ///
+    /// # Errors
+    /// [`EndpointError`] when the name is malformed or the middleware refuses.
+    pub fn open_tanker(ros: &mut RosNode, is_wanted: bool) -> Result<Self, EndpointError> {
+        if !is_wanted {
+            return Ok(Self::None);
+        }
+        let Topic { name, qos, .. } = topics::TANKER_ATTITUDE;
+        Ok(Self::Imu(ros.subscription(name, &qos)?))
+    }
+
+    /// Returns the subscription to the topic of the receiver's source.
     ///
     /// # Errors
     /// [`EndpointError`] when the name is malformed or the middleware refuses.

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::attitude::AttitudeMessage;
+use super::attitudes::{Attitudes, NoReportedAttitude};
 use super::consumers::{Consumers, Protection, Silence};
 use super::convert;
 use super::graph::Graph;
@@ -11,17 +12,18 @@ use super::messages::{CameraInfo, Header};
 use super::monitor::{Answer, Monitor, Subject};
 use super::once::SaidOnce;
 use super::outputs::Outputs;
-use super::topics::ATTITUDE;
+use super::topics::{ATTITUDE, TANKER_ATTITUDE};
 use crate::config::Configuration;
 use crate::estimation::Solution;
 use crate::picture::Picture;
-use crate::pipeline::{DetectionFrame, FrameOutcome, Pipeline, TrackCode};
+use crate::pipeline::{DetectionFrame, FrameOutcome, Pipeline, Stamp, TrackCode};
 use crate::text::{echoed, quoted};
 
 /// The pipeline between its messages.
 pub(super) struct Handler {
     pipeline: Pipeline,
     reader: InputReader,
+    attitudes: Attitudes,
     outputs: Outputs,
     monitor: Monitor,
     active: bool,
@@ -33,12 +35,14 @@ impl Handler {
     pub(super) fn new(
         pipeline: Pipeline,
         reader: InputReader,
+        attitudes: Attitudes,
         outputs: Outputs,
         monitor: Monitor,
     ) -> Self {
         Self {
             pipeline,
             reader,
+            attitudes,
             outputs,
             monitor,
             active: false,
@@ -80,10 +84,13 @@ impl Handler {
             detections,
             ignored_ids,
         } = self.reader.read(message);
+        let stamp = Stamp::from(header.stamp);
+        let reported = self.attitudes.reported(stamp.nanoseconds());
         let frame = DetectionFrame {
-            stamp: header.stamp.into(),
+            stamp,
             frame_id: header.frame_id.clone(),
             detections,
+            receiver_from_tanker: reported.and_then(Result::ok),
         };
         let outcome = self.pipeline.process(&frame);
         // A frame with a longer name is refused, so no pose has a cut one.
@@ -92,7 +99,16 @@ impl Handler {
             ..header
         };
         let solve_time = begin.elapsed();
-        let status = convert::status(header.clone(), &outcome, &ignored_ids, solve_time);
+        let mut status = convert::status(header.clone(), &outcome, &ignored_ids, solve_time);
+        if let Some(reported) = reported
+            && outcome.header_fits()
+        {
+            let missing = reported.err();
+            self.monitor.on_reported_attitude(missing, begin);
+            if let Some(missing) = missing {
+                append(&mut status.message, &missing);
+            }
+        }
         let message = status.message.clone();
         let answer = Answer {
             frame: &frame,
@@ -129,9 +145,13 @@ impl Handler {
     /// Takes a sample of the receiver's attitude.
     pub(super) fn on_attitude(&mut self, message: &AttitudeMessage) {
         self.monitor.on_decoded(ATTITUDE);
-        if let Some(consumers) = &mut self.outputs.consumers {
-            consumers.on_attitude(message);
-        }
+        self.attitudes.on_receiver(message);
+    }
+
+    /// Takes a sample of the tanker's attitude.
+    pub(super) fn on_tanker_attitude(&mut self, message: &AttitudeMessage) {
+        self.monitor.on_decoded(TANKER_ATTITUDE.name);
+        self.attitudes.on_tanker(message);
     }
 
     /// Takes changed parameters, for the next frame on.
@@ -139,6 +159,7 @@ impl Handler {
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_configuration(&configuration.consumers);
         }
+        self.attitudes.on_configuration(&configuration);
         self.understand(&configuration);
         self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
@@ -180,7 +201,7 @@ impl Handler {
         if let Some(consumers) = &mut self.outputs.consumers {
             report
                 .status
-                .push(consumers.diagnostics(self.monitor.node()));
+                .push(consumers.diagnostics(self.monitor.node(), &mut self.attitudes.receiver));
         }
         if let Some(integrity) = &mut self.outputs.integrity {
             report
@@ -226,7 +247,8 @@ impl Handler {
             consumers.check(protection)?;
             Ok((solution, motion))
         });
-        consumers.on_pose(header, place, &mut self.monitor.tally);
+        let receiver = &self.attitudes.receiver;
+        consumers.on_pose(header, place, receiver, &mut self.monitor.tally);
     }
 
     /// Publishes the track at the frame's stamp, if there is one.
@@ -271,4 +293,13 @@ impl Handler {
         };
         output.publish(convert::markers(header, &picture), &mut self.monitor.tally);
     }
+}
+
+/// Adds to the words about a frame why it has no prior from reported attitudes.
+fn append(message: &mut String, missing: &NoReportedAttitude) {
+    if !message.is_empty() {
+        message.push_str("; ");
+    }
+    message.push_str("no reported attitude: ");
+    message.push_str(&missing.to_string());
 }

@@ -12,6 +12,7 @@ pub(super) struct Inputs {
     pub(super) detections: InputSubscription,
     pub(super) camera_info: Subscription<CameraInfo>,
     pub(super) attitude: AttitudeSubscription,
+    pub(super) tanker_attitude: AttitudeSubscription,
     /// That of the detections.
     pub(super) topic: &'static str,
     pub(super) depths: Depths,
@@ -22,6 +23,7 @@ pub(super) struct Depths {
     pub(super) detections: usize,
     pub(super) camera_info: usize,
     pub(super) attitude: usize,
+    pub(super) tanker_attitude: usize,
 }
 
 impl Inputs {
@@ -33,15 +35,21 @@ impl Inputs {
         let camera_info = topics::CAMERA_INFO;
         let detections = configuration.input.topic();
         let attitude = configuration.consumers.attitude;
+        let tanker_attitude = topics::TANKER_ATTITUDE;
         let depth = |topic: &Topic| ros.subscription_depth(topic.name, &topic.qos);
         let depths = Depths {
             detections: depth(&detections)?,
             camera_info: depth(&camera_info)?,
             attitude: attitude.map_or(Ok(1), |source| depth(&source.topic()))?,
+            tanker_attitude: depth(&tanker_attitude)?,
         };
         Ok(Self {
             camera_info: ros.subscription(camera_info.name, &camera_info.qos)?,
             attitude: AttitudeSubscription::open(ros, attitude)?,
+            tanker_attitude: AttitudeSubscription::open_tanker(
+                ros,
+                tanker_attitude.is_open(configuration),
+            )?,
             detections: InputSubscription::open(ros, configuration.input)?,
             topic: detections.name,
             depths,

@@ -6,7 +6,8 @@
 //! output, outputs, inputs            what the node publishes on and listens to, opened from the table
 //! files, error                       the files that parameters name; why the node cannot start
 //! health, understood, diagnostics    faults around the node, said and shown
-//! consumers, attitude                messages for refuelling and flight stacks, by the receiver's attitude
+//! attitude, attitudes                what receiver and tanker report of their attitudes
+//! consumers                          messages for refuelling and flight stacks, by the receiver's attitude
 //! predicted_points, reset            where detectors may look in the next image; `~/reset`
 //! monitor, handler                   the node's health once a second; one message's work
 //! node, serve                        all of it together, until a signal or a tool ends it
@@ -17,6 +18,7 @@
 //! start from [`participant::RosNode::open`].
 
 pub mod attitude;
+mod attitudes;
 pub mod consumers;
 pub mod convert;
 pub mod diagnostics;

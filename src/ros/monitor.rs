@@ -1,7 +1,9 @@
 //! The node's health: what it counts, the faults around it, what it says of them, and its report once a second.
 
+use std::fmt;
 use std::time::{Duration, Instant};
 
+use super::attitudes::NoReportedAttitude;
 use super::clock::NodeClock;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::graph::Graph;
@@ -168,6 +170,16 @@ impl Monitor {
         self.on_pose(outcome);
         let rotation = &solution.camera_from_tanker.rotation;
         self.watch.on_attitude(rotation, now)
+    }
+
+    /// Records why a frame has no prior from the attitudes that both aircraft report, or that it has one.
+    pub(super) fn on_reported_attitude(
+        &mut self,
+        missing: Option<NoReportedAttitude>,
+        now: Instant,
+    ) {
+        let missing = missing.as_ref().map(|missing| missing as &dyn fmt::Display);
+        self.watch.on_reported_attitude(missing, now);
     }
 
     /// Records how well a frame's residuals agree with what is stated, once it has been answered.

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 
+use super::attitudes::Attitudes;
 use super::clock::{NodeClock, SimTime};
 use super::environment::Environment;
 use super::error::NodeError;
@@ -28,6 +29,7 @@ use crate::target::MarkerMap;
 use crate::text;
 
 const CAMERA_INFO: &str = topics::CAMERA_INFO.name;
+const TANKER_ATTITUDE: &str = topics::TANKER_ATTITUDE.name;
 
 /// How often the loop looks whether it could run at all.
 const BEAT: Duration = Duration::from_millis(100);
@@ -146,14 +148,17 @@ impl<'a> Server<'a> {
         let (detections, lost_detections) =
             Newest::new(inputs.detections.stream(), depths.detections);
         let (attitudes, lost_attitudes) = Newest::new(inputs.attitude.stream(), depths.attitude);
+        let (of_tanker, lost_of_tanker) =
+            Newest::new(inputs.tanker_attitude.stream(), depths.tanker_attitude);
         let lost = [
             (topic, lost_detections),
             (CAMERA_INFO, lost_infos),
             (ATTITUDE, lost_attitudes),
+            (TANKER_ATTITUDE, lost_of_tanker),
         ];
         let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
         let mut last_beat = Instant::now();
-        pin_mut!(camera_infos, attitudes, detections, beats);
+        pin_mut!(camera_infos, attitudes, of_tanker, detections, beats);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
@@ -175,6 +180,10 @@ impl<'a> Server<'a> {
                 sample = attitudes.select_next_some() => self.with(|handler| match sample {
                     Ok(message) => handler.on_attitude(&message),
                     Err(error) => handler.on_undecodable(ATTITUDE, &error),
+                }),
+                sample = of_tanker.select_next_some() => self.with(|handler| match sample {
+                    Ok(message) => handler.on_tanker_attitude(&message),
+                    Err(error) => handler.on_undecodable(TANKER_ATTITUDE, &error),
                 }),
                 _ = seconds.select_next_some() => {
                     self.ros.check_alive()?;
@@ -320,7 +329,8 @@ impl<'a> Server<'a> {
             Instant::now(),
         );
         let monitor = Monitor::new(names.base_name(), self.clock.clone(), watch);
-        Ok(Handler::new(pipeline, reader, outputs, monitor))
+        let attitudes = Attitudes::new(configuration);
+        Ok(Handler::new(pipeline, reader, attitudes, outputs, monitor))
     }
 
     fn activate(&mut self, on: bool) {

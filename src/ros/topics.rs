@@ -82,6 +82,10 @@ topics! {
     IMU = input("/mavros/imu/data", ATTITUDE_INPUT, |node| {
         matches!(node.consumers.attitude, Some(AttitudeSource::Imu))
     });
+    /// Input: the tanker's attitude, as its own autopilot knows it.
+    TANKER_ATTITUDE = input("tanker_attitude", ATTITUDE_INPUT, |node| {
+        node.settings.reported_attitude.is_some()
+    });
     /// Output: trusted poses.
     POSE = output("pose", OUTPUT, |_| true);
     /// Output: the track, pose and twist.
@@ -229,6 +233,11 @@ mod tests {
                 [found.input.topic().name, CAMERA_INFO.name]
             );
         }
+        let sigma = ("reported_attitude_sigma_deg", ParameterValue::Double(2.0));
+        assert_eq!(
+            listens(&configuration(&[sigma]))[2..],
+            [TANKER_ATTITUDE.name]
+        );
         let mut found = configuration(&[]);
         for source in [AttitudeSource::Px4, AttitudeSource::Imu] {
             found.consumers.attitude = Some(source);

@@ -213,6 +213,16 @@ def nothing(scene: Scene) -> None:
 RELIABLE_INPUT = ("-p", "qos_overrides./feature_points.subscription.reliability:=reliable")
 SIM_TIME = ("-p", "use_sim_time:=true")
 
+def report_attitudes(scene: Scene) -> None:
+    scene.speak("/mavros/imu/data", "/tanker_attitude")
+
+
+# Of the receiver and of the tanker, which comes with every step.
+REPORTED = (
+    *("-p", "attitude:=imu", "-p", "reported_attitude_sigma_deg:=2.0"),
+    *("-p", "attitude_max_age_s:=0.5", "-p", "tanker_attitude_max_age_s:=0.5"),
+)
+
 CASES = {
     "publisher offers less": Case(
         "incompatible_qos",
@@ -340,5 +350,12 @@ CASES = {
     ),
     "no clock": Case(
         "no_clock", "no /clock message has arrived", nothing, lambda scene: scene.speak("/clock"), SIM_TIME
+    ),
+    "tanker that does not report its attitude": Case(
+        "no_reported_attitude",
+        "the receiver's attitude: need 2 samples of the attitude, got 0",
+        both,
+        report_attitudes,
+        REPORTED,
     ),
 }

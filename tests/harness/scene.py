@@ -4,9 +4,11 @@ from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Quaternion
 from rclpy.duration import Duration
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Imu
+from std_msgs.msg import Header
 from tanker_pose.msg import FeaturePointArray
 
 from harness import messages
@@ -37,7 +39,13 @@ class Scene:
 
     def have(self, *topics: str) -> None:
         """Adds publishers that say nothing yet."""
-        kinds = {"/camera_info": CameraInfo, "/feature_points": FeaturePointArray, "/clock": Clock}
+        kinds = {
+            "/camera_info": CameraInfo,
+            "/feature_points": FeaturePointArray,
+            "/clock": Clock,
+            "/mavros/imu/data": Imu,
+            "/tanker_attitude": Imu,
+        }
         for topic in topics:
             if topic not in self.publishers:
                 self.publishers[topic] = self.peer.node.create_publisher(
@@ -67,6 +75,10 @@ class Scene:
             return messages.camera_info()
         if topic == "/clock":
             return Clock(clock=Time(sec=self.clock_s))
+        if topic in ("/mavros/imu/data", "/tanker_attitude"):
+            # Both fly straight to the east, alike.
+            stamp = messages.stamp_of(FRAMES_PER_STEP * self.index)
+            return Imu(header=Header(stamp=stamp), orientation=Quaternion(w=1.0))
         frame = messages.exact_frame(FRAMES_PER_STEP * self.index)
         frame.header.frame_id = self.frame_id
         return frame

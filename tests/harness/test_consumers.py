@@ -349,6 +349,10 @@ def test_nothing_of_it_is_opened_unless_asked_for(
             ["publish_mavros_pose:=true", f"refuelling:={SETUP}"],
             'publish_mavros_pose needs the parameter "attitude"',
         ),
+        (
+            ["reported_attitude_sigma_deg:=2.0"],
+            'reported_attitude_sigma_deg above 0 needs the parameter "attitude"',
+        ),
         (["publish_receptacle:=true", "refuelling:=nowhere.yaml"], "cannot read"),
         (
             ["publish_receptacle:=true", f"refuelling:={SETUP}", "track:=false"],

@@ -30,14 +30,16 @@ pub enum CauseKind {
     Calibration,
     /// A shift of the whole image, independent in each frame.
     Jitter,
-    /// The prior of the attitude.
+    /// The prior about the nominal attitude.
     Attitude,
+    /// The prior about the attitude that both aircraft report.
+    ReportedAttitude,
 }
 
 /// One cause in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its name: that of a mode, or `noise`, `correlated_noise`, `survey`, `jitter_u`, `jitter_v`, `attitude`.
+    /// Its name: that of a mode, or `noise`, `correlated_noise`, `survey`, `jitter_u`, `jitter_v`, `attitude`, `reported_attitude`.
     pub name: String,
     /// What kind of cause it is.
     pub kind: CauseKind,
@@ -92,10 +94,10 @@ struct Row {
 /// Returns the effects of all causes; `None` if a point has no pixel at the pose or the pose is not determined.
 ///
 /// # Inputs
-/// * `attitude_information`: of the prior about each axis, 1/rad²; 0 without a prior.
+/// * `prior`: which prior of the attitude there is, and its information about each axis, 1/rad².
 pub(in crate::estimation) fn frame_causes(
     budget: Option<&ErrorBudget>,
-    attitude_information: f64,
+    prior: Option<(CauseKind, f64)>,
     camera: &Camera,
     observations: &[Observation],
     solution: &Solution,
@@ -129,7 +131,7 @@ pub(in crate::estimation) fn frame_causes(
     let through = &cross * &amplitudes; // C A⁻¹
     information -= &through * cross.transpose();
     for axis in 3..6 {
-        information[(axis, axis)] += attitude_information;
+        information[(axis, axis)] += prior.map_or(0.0, |(_, of_axis)| of_axis);
     }
     let covariance = information.cholesky()?.inverse();
     let shifts = covariance * &through;
@@ -176,10 +178,14 @@ pub(in crate::estimation) fn frame_causes(
         });
     }
     let mut attitude_shifts = None;
-    if attitude_information > 0.0 {
-        let gain = covariance.fixed_view::<6, 3>(0, 3) * attitude_information.sqrt();
+    if let Some((kind, of_axis)) = prior {
+        let gain = covariance.fixed_view::<6, 3>(0, 3) * of_axis.sqrt();
         let by_prior = gain * gain.transpose();
-        causes.push(many("attitude", CauseKind::Attitude, by_prior));
+        let name = match kind {
+            CauseKind::ReportedAttitude => "reported_attitude",
+            _ => "attitude",
+        };
+        causes.push(many(name, kind, by_prior));
         attitude_shifts = Some([0, 1, 2].map(|axis| gain.column(axis).into_owned()));
     }
     Some(FrameCauses {

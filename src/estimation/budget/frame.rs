@@ -1,6 +1,6 @@
 //! The budget of one frame: the errors of each point, in blocks of four that correspond to those of the points.
 
-use nalgebra::{Rotation3, Vector2, Vector3};
+use nalgebra::{Rotation3, UnitQuaternion, Vector2, Vector3};
 use smallvec::SmallVec;
 
 use super::{ErrorBudget, ImageMode, MAX_IMAGE_MODES};
@@ -25,6 +25,15 @@ pub(crate) struct AttitudePrior {
     pub(crate) camera_from_tanker: Rotation3<f64>,
     /// 1/rad².
     pub(crate) information: f64,
+}
+
+impl AttitudePrior {
+    /// Returns the turn from the prior to a rotation, rad, camera axes.
+    pub(crate) fn turn_to(&self, camera_from_tanker: &Rotation3<f64>) -> Vector3<f64> {
+        let turn = camera_from_tanker * self.camera_from_tanker.inverse();
+        // By its quaternion: of hardly any turn the matrix's trace gives half the digits, or NaN.
+        UnitQuaternion::from_rotation_matrix(&turn).scaled_axis()
+    }
 }
 
 /// The error budget of each point of a frame.
@@ -56,6 +65,12 @@ impl FrameBudget {
             image_modes: 0,
             attitude,
         }
+    }
+
+    /// Returns the prior of the attitude, if there is one.
+    #[inline(always)]
+    pub(crate) const fn attitude(&self) -> Option<&AttitudePrior> {
+        self.attitude.as_ref()
     }
 
     /// Returns the degrees of freedom that the prior adds to the test of the residuals.

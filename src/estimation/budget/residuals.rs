@@ -259,7 +259,7 @@ impl FrameBudget {
         kept.reduce_slope(residual, &mut slope);
         if let Some(prior) = &self.attitude {
             // The rotation vector is invariant under the derivative of the logarithm.
-            let turn = (pose.rotation * prior.camera_from_tanker.inverse()).scaled_axis();
+            let turn = prior.turn_to(&pose.rotation);
             for axis in 0..3 {
                 slope.gradient[axis] += prior.information * turn[axis];
             }

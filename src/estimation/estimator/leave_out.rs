@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::estimation::exclude::{self, Found, Suspects};
 use crate::estimation::lanes::points::INLINE_POINTS;
 use crate::estimation::problem::{Problem, Room};
-use crate::estimation::{Initialisation, Observation, Refinement, Solution};
+use crate::estimation::{Expected, Initialisation, Observation, Refinement, Solution};
 
 /// rad; a subset whose pose is turned farther from its prior than this fits noise.
 const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
@@ -20,16 +20,16 @@ impl Estimator {
         &self,
         camera: &Camera,
         observations: &[Observation],
-        previous: Option<&Rotation3<f64>>,
+        expected: &Expected,
         of_all: Option<&Solution>,
     ) -> Found {
-        let suspects = self.suspects(camera, observations, of_all, previous);
+        let suspects = self.suspects(camera, observations, of_all, expected);
         let judge = exclude::Judge {
             solve: |points: &[Observation]| {
                 self.check_count(points)?;
-                self.estimate_with_all(camera, points, previous)
+                self.estimate_with_all(camera, points, expected)
             },
-            prior_cost: |solution: &Solution| self.prior_cost(solution, previous),
+            prior_cost: |solution: &Solution| self.prior_cost(solution, expected),
             min_remaining: match self.settings.initialisation {
                 Initialisation::Nominal | Initialisation::Previous => {
                     exclude::MIN_REMAINING_WITH_PRIOR
@@ -46,10 +46,10 @@ impl Estimator {
 
     /// Returns the cost of the prior for a hypothesis about wrong points: infinite beyond [`MAX_TURN_FROM_PRIOR`], 0
     /// for initialisations without a prior.
-    fn prior_cost(&self, solution: &Solution, previous: Option<&Rotation3<f64>>) -> f64 {
+    fn prior_cost(&self, solution: &Solution, expected: &Expected) -> f64 {
         let prior = match solution.initialisation {
-            Initialisation::Nominal => Some(&self.settings.nominal_camera_from_tanker),
-            Initialisation::Previous => previous,
+            Initialisation::Nominal => Some(self.likely_rotation(expected)),
+            Initialisation::Previous => expected.previous,
             Initialisation::Dlt | Initialisation::Global => None,
         };
         let cost = squared_turn(
@@ -70,15 +70,15 @@ impl Estimator {
         camera: &Camera,
         observations: &[Observation],
         of_all: Option<&Solution>,
-        previous: Option<&Rotation3<f64>>,
+        expected: &Expected,
     ) -> Suspects {
         let most = exclude::max_suspects(observations.len());
         let count = observations.len();
         let pose = of_all
             .map(|solution| solution.camera_from_tanker)
             .or_else(|| {
-                let expected = previous.unwrap_or(&self.settings.nominal_camera_from_tanker);
-                (count > most).then(|| expected_pose(camera, observations, expected))?
+                let likely = expected.previous.unwrap_or(self.likely_rotation(expected));
+                (count > most).then(|| expected_pose(camera, observations, likely))?
             });
         let mut all: SmallVec<[(f64, usize); INLINE_POINTS]> = observations
             .iter()

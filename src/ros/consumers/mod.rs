@@ -9,19 +9,16 @@ mod gated;
 mod silence;
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use crate::config::{Configuration, ConsumerConfiguration, OutputError};
 use crate::estimation::Solution;
-use crate::frames::{AttitudeHistory, LocalAttitude, PoseEstimate};
+use crate::frames::{LocalAttitude, PoseEstimate};
 use crate::geometry::Motion;
 use crate::pipeline::Stamp;
 use crate::refuelling::{RefuellingGeometry, RefuellingSetup, RefuellingSetupError};
-use crate::ros::attitude::AttitudeMessage;
-use crate::ros::convert;
+use crate::ros::attitudes::HeardAttitude;
 use crate::ros::diagnostics::Tally;
 use crate::ros::messages::{DiagnosticStatus, Header, KeyValue};
-use crate::ros::once::SaidOnce;
 use crate::ros::participant::{EndpointError, RosNode};
 use crate::ros::topics;
 use crate::text;
@@ -80,10 +77,6 @@ pub struct Consumers {
     setup: RefuellingSetup,
     geometry: RefuellingGeometry,
     configuration: ConsumerConfiguration,
-    attitudes: AttitudeHistory,
-    resets: Option<u8>,
-    bad_attitude: SaidOnce<()>,
-    last_bad_attitude: Option<String>,
     outputs: Vec<Box<dyn GatedOutput>>,
 }
 
@@ -126,24 +119,16 @@ impl Consumers {
         Ok(Some(Self {
             geometry: setup.geometry(&configuration.receiver_from_camera),
             setup,
-            attitudes: AttitudeHistory::new(configuration.attitude_max_age_s),
-            resets: None,
-            bad_attitude: SaidOnce::default(),
-            last_bad_attitude: None,
             outputs: outputs.into_iter().flatten().collect(),
             configuration: configuration.clone(),
         }))
     }
 
-    /// Reloads setup and mount: a stale lever arm gives a plausible but wrong position. Attitudes and counts start again,
-    /// like everything that a clean-up forgets.
+    /// Reloads setup and mount: a stale lever arm gives a plausible but wrong position. Counts start again, like
+    /// everything that a clean-up forgets.
     pub fn configure(&mut self, configuration: &ConsumerConfiguration, setup: RefuellingSetup) {
         self.setup = setup;
         self.on_configuration(configuration);
-        self.attitudes.clear();
-        self.resets = None;
-        self.bad_attitude = SaidOnce::default();
-        self.last_bad_attitude = None;
         for output in &mut self.outputs {
             output.reset();
         }
@@ -152,36 +137,6 @@ impl Consumers {
     /// Takes changed parameters: of these only the camera's mount can change.
     pub fn on_configuration(&mut self, configuration: &ConsumerConfiguration) {
         self.geometry = self.setup.geometry(&configuration.receiver_from_camera);
-    }
-
-    /// Takes a sample of the receiver's attitude.
-    pub fn on_attitude(&mut self, message: &AttitudeMessage) {
-        let sample = match message {
-            AttitudeMessage::Px4(message) => {
-                // Across a reset the difference of two samples is no rate.
-                if self.resets.replace(message.quat_reset_counter)
-                    != Some(message.quat_reset_counter)
-                {
-                    self.attitudes.clear();
-                }
-                convert::px4_attitude(message, self.configuration.px4_minus_ros_us)
-            }
-            AttitudeMessage::Imu(message) => convert::imu_attitude(message),
-        };
-        match sample {
-            Ok(sample) => {
-                self.attitudes.push(sample);
-                if let Some(count) = self.bad_attitude.good() {
-                    log::info!("the receiver's attitude is usable again after {count} bad samples");
-                }
-            }
-            Err(error) => {
-                if self.bad_attitude.fault((), Instant::now()) {
-                    log::warn!("ignoring a sample of the receiver's attitude: {error}");
-                }
-                self.last_bad_attitude = Some(error.to_string());
-            }
-        }
     }
 
     /// Returns what is fixed to the two aircraft.
@@ -204,6 +159,7 @@ impl Consumers {
         &mut self,
         header: &Header,
         place: Result<(&Solution, Option<&Motion>), Silence>,
+        receiver: &HeardAttitude,
         tally: &mut Tally,
     ) {
         let frame = match place {
@@ -220,7 +176,7 @@ impl Consumers {
                         b_from_a: solution.camera_from_tanker,
                         covariance: solution.covariance,
                     }),
-                    attitude: self.attitude_at(stamp_ns),
+                    attitude: self.attitude_at(receiver, stamp_ns),
                     px4_minus_ros_us: self.configuration.px4_minus_ros_us,
                 })
             }
@@ -232,7 +188,11 @@ impl Consumers {
     }
 
     /// Returns the health of these outputs since the last report.
-    pub fn diagnostics(&mut self, node: &str) -> DiagnosticStatus {
+    pub(super) fn diagnostics(
+        &mut self,
+        node: &str,
+        receiver: &mut HeardAttitude,
+    ) -> DiagnosticStatus {
         let mut values = Vec::new();
         let mut reasons: Vec<String> = Vec::new();
         for output in &mut self.outputs {
@@ -240,7 +200,7 @@ impl Consumers {
         }
         values.push(KeyValue {
             key: "unusable_attitude".to_owned(),
-            value: self.last_bad_attitude.take().unwrap_or_default(),
+            value: receiver.take_last_bad().unwrap_or_default(),
         });
         DiagnosticStatus {
             level: if reasons.is_empty() {
@@ -259,8 +219,12 @@ impl Consumers {
         }
     }
 
-    fn attitude_at(&self, stamp_ns: i64) -> Result<LocalAttitude, Silence> {
-        let found = self.attitudes.at(stamp_ns)?;
+    fn attitude_at(
+        &self,
+        receiver: &HeardAttitude,
+        stamp_ns: i64,
+    ) -> Result<LocalAttitude, Silence> {
+        let found = receiver.at(stamp_ns)?;
         Ok(LocalAttitude {
             local_from_b: found.local_from_body,
             covariance: self.configuration.attitude_covariance,

@@ -7,7 +7,7 @@ use crate::ros::health::Unexpected;
 /// Why an output is held back for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(in crate::ros) enum Silence {
-    #[error(transparent)]
+    #[error("the receiver's attitude: {0}")]
     Attitude(#[from] AttitudeError),
     #[error(transparent)]
     FlightStack(#[from] FlightStackError),

@@ -30,6 +30,7 @@ fn solution() -> Solution {
         chi_squared_limit: 26.1,
         initialisation: Initialisation::Dlt,
         excluded: Excluded::default(),
+        prior: None,
         unclear: Excluded::default(),
     }
 }

@@ -28,6 +28,8 @@ pub enum Fault {
     Sigma,
     /// The tanker stands off its nominal attitude.
     UnexpectedAttitude,
+    /// Frames have no prior from the attitudes that both aircraft report.
+    NoReportedAttitude,
     /// Images are from the future, or from long ago.
     ClockOffset,
     /// Stamps of detections jump back, or far ahead.
@@ -53,7 +55,7 @@ const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -65,6 +67,7 @@ impl Fault {
         Self::NotTrusted,
         Self::Sigma,
         Self::UnexpectedAttitude,
+        Self::NoReportedAttitude,
         Self::ClockOffset,
         Self::StampJump,
         Self::ClockJump,
@@ -89,6 +92,7 @@ impl Fault {
             Self::NotTrusted => "not_trusted",
             Self::Sigma => "sigma",
             Self::UnexpectedAttitude => "unexpected_attitude",
+            Self::NoReportedAttitude => "no_reported_attitude",
             Self::ClockOffset => "clock_offset",
             Self::StampJump => "stamp_jump",
             Self::ClockJump => "clock_jump",
@@ -108,6 +112,7 @@ impl Fault {
             | Self::SuspectMarker
             | Self::NotTrusted
             | Self::Sigma
+            | Self::NoReportedAttitude
             | Self::ClockOffset
             | Self::Undecodable => SHOWN_BY_FRAMES,
             // Looked for every second.

@@ -237,6 +237,17 @@ impl Watch {
         }
     }
 
+    /// Records whether a frame has its prior from the attitudes that both aircraft report, or why it has none.
+    pub fn on_reported_attitude(&mut self, missing: Option<&dyn fmt::Display>, now: Instant) {
+        match missing {
+            Some(missing) => {
+                let words = format!("frames have no prior from reported attitudes: {missing}");
+                self.faults.see(Fault::NoReportedAttitude, &words, now);
+            }
+            None => self.faults.end(Fault::NoReportedAttitude),
+        }
+    }
+
     /// Records a refusal that reveals a fault around the node.
     pub fn on_refusal(&mut self, fault: Fault, words: &str, now: Instant) {
         if fault == Fault::NoCameraInfo {

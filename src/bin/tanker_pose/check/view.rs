@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Matrix3x6, RowVector6};
-use tanker_pose::estimation::{Estimator, Observation, Solution};
+use tanker_pose::estimation::{Estimator, Expected, Observation, Solution};
 use tanker_pose::geometry::{PoseCovariance, skew};
 use tanker_pose::pipeline;
 
@@ -92,7 +92,7 @@ pub fn view(
         name.map_or_else(|| format!("mode {index}"), str::to_owned)
     };
     let causes = match wanted {
-        Wanted::Shares => estimator.causes(camera, observations, &solution),
+        Wanted::Shares => estimator.causes(camera, observations, &solution, &Expected::default()),
         Wanted::LevelsOnly => None,
     };
     let causes = causes.map_or_else(Vec::new, |causes| causes.causes);
