@@ -1,19 +1,17 @@
 //! The track: when it begins, what it believes, when it ends.
 
-use nalgebra::{Isometry3, Matrix6, Vector3};
+use nalgebra::Isometry3;
 
-use super::belief::{Belief, State, StateMotion};
-use super::history::{Entry, Frame, History, Measured, Place};
-use super::lag::{Lag, MEMORY_FRAMES};
+use super::belief::Belief;
+use super::frame::{Frame, Measured, check};
+use super::history::{Entry, History, Place};
 use super::lasting::{Lasting, LastingError};
-use super::model::{
-    Difference, Innovation, Noise, Transition, add_noise, advance, predict, symmetric,
-};
-use super::outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};
+use super::model::{Noise, predict};
+use super::outcome::{PredictError, StartReason, TrackOutcome};
 use super::settings::{Checked, CheckedFilterSettings, FilterSettings, FilterSettingsError};
-use super::symmetric6::{Factor, rows};
+use super::state::{Refused, State, step};
 use super::track::{Track, seconds};
-use crate::geometry::{Matrix12, Motion, PoseCovariance};
+use crate::geometry::{Motion, PoseCovariance};
 
 /// Turns poses of single frames into a track. It reads no clock, and allocates only until it has room for the frames of
 /// half a second.
@@ -29,12 +27,6 @@ pub struct Filter {
     history: History,
     /// Room for a prediction.
     scratch: Lasting,
-}
-
-/// Why a pose does not correct a track or candidate.
-enum Refused {
-    Contradicts { innovation_squared: f64 },
-    LostPrecision,
 }
 
 impl From<CheckedFilterSettings> for Filter {
@@ -330,128 +322,4 @@ impl Filter {
         }
         floored
     }
-}
-
-impl Checked {
-    fn noise(&self, lag: &Lag) -> &Noise {
-        if lag.is_manoeuvring() {
-            &self.manoeuvre_noise
-        } else {
-            &self.noise
-        }
-    }
-
-    /// Makes a state the candidate that begins with a frame.
-    fn begin(&self, state: &mut Option<State>, frame: &Frame, measured: &Measured) {
-        let mut lasting = state
-            .take()
-            .map_or_else(Lasting::default, |state| state.lasting);
-        let noise = measured.noise.0 + lasting.start(&frame.lasting);
-        let mut covariance = Matrix12::zeros();
-        covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&noise);
-        for axis in 0..3 {
-            covariance[(6 + axis, 6 + axis)] = self.initial_speed_variance;
-            covariance[(9 + axis, 9 + axis)] = self.initial_rate_variance;
-        }
-        let motion = StateMotion {
-            stamp_ns: frame.stamp_ns,
-            given_causes: Motion {
-                b_from_a: measured.camera_from_tanker,
-                velocity_in_b: Vector3::zeros(),
-                rate_in_b: Vector3::zeros(),
-                covariance,
-            },
-            consistent_frames: 1,
-            lag: Lag::default(),
-        };
-        *state = Some(State { motion, lasting });
-    }
-}
-
-/// Corrects a track or candidate by a pose after it, and returns the squared innovation. What contradicts it leaves it
-/// as it was.
-fn step(
-    checked: &Checked,
-    scratch: &mut Lasting,
-    state: &mut State,
-    frame: &Frame,
-    measured: &Measured,
-) -> Result<f64, Refused> {
-    let StateMotion {
-        stamp_ns,
-        given_causes,
-        consistent_frames,
-        lag,
-    } = &state.motion;
-    let gap_s = seconds(frame.stamp_ns, *stamp_ns);
-    let transition = Transition::new(given_causes, gap_s);
-    let mut predicted = advance(given_causes, &transition, checked.noise(lag));
-    let difference = Difference::new(&predicted, &measured.camera_from_tanker);
-    scratch.clone_from(&state.lasting);
-    scratch.predict(gap_s, &transition, &mut predicted.covariance);
-    let noise = measured.noise.0 + scratch.see(&frame.lasting, &difference.turn);
-    let noise = PoseCovariance(noise);
-    let sums = scratch.sums();
-    let innovate = |from: &Motion| {
-        let covariance = from.pose_covariance();
-        Innovation::new(&difference, &covariance, &noise, sums.as_ref())
-            .ok_or(Refused::LostPrecision)
-    };
-    let mut innovation = innovate(&predicted)?;
-    let innovation_squared = innovation.squared;
-    if innovation_squared > checked.gate {
-        return Err(Refused::Contradicts { innovation_squared });
-    }
-    let next_lag = lag.with(&innovation.whitened, gap_s, checked.lag_limit);
-    if next_lag.is_manoeuvring() && !lag.is_manoeuvring() {
-        // It has lagged since it began to lean, so the larger noise is owed for that time too.
-        add_noise(
-            &mut predicted,
-            MEMORY_FRAMES * gap_s,
-            &checked.manoeuvre_noise,
-        );
-        innovation = innovate(&predicted)?;
-    }
-    let correction = innovation
-        .correct(&predicted, sums.as_ref())
-        .ok_or(Refused::LostPrecision)?;
-    scratch.correct(&correction);
-    std::mem::swap(&mut state.lasting, scratch);
-    state.motion = StateMotion {
-        stamp_ns: frame.stamp_ns,
-        given_causes: correction.motion,
-        consistent_frames: consistent_frames.saturating_add(1),
-        lag: next_lag,
-    };
-    Ok(innovation_squared)
-}
-
-fn check(
-    pose: &Isometry3<f64>,
-    noise: &PoseCovariance,
-    lasting: &[LastingError],
-) -> Result<(), MeasurementError> {
-    let position = pose.translation.vector;
-    let numbers = position.iter().chain(pose.rotation.coords.iter());
-    if !numbers.copied().all(f64::is_finite) {
-        return Err(MeasurementError::PoseNotFinite);
-    }
-    let is_usable = |error: &LastingError| {
-        error.shift.iter().all(|number| number.is_finite())
-            && error.time_constant_s.is_none_or(|s| s > 0.0)
-    };
-    if !lasting.iter().all(is_usable) {
-        return Err(MeasurementError::InvalidLastingError);
-    }
-    let is_symmetric = noise.0 == noise.0.transpose();
-    // All of the noise may last: then the frame has none of its own.
-    let whole = lasting.iter().fold(noise.0, |sum, error| {
-        sum + error.shift * error.shift.transpose()
-    });
-    let is_covariance = |m: &Matrix6<f64>| Factor::new(&rows(&symmetric(m))).is_some();
-    let has_no_negative_variance = noise.0.diagonal().iter().all(|variance| *variance >= 0.0);
-    if !(is_symmetric && has_no_negative_variance && is_covariance(&whole)) {
-        return Err(MeasurementError::InvalidCovariance);
-    }
-    Ok(())
 }

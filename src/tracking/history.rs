@@ -2,33 +2,14 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Isometry3;
-
 use super::belief::Belief;
-use super::lasting::LastingError;
+use super::frame::Frame;
 use super::track::seconds;
-use crate::geometry::PoseCovariance;
 
 /// ns behind the newest frame; older ones are refused.
 const REACH_NS: i64 = 500_000_000;
 /// Frames that are remembered at most: half a second at 120 Hz.
 const MAX_FRAMES: usize = 60;
-
-/// A pose with its covariance given the lasting causes, the floor added.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Measured {
-    pub(super) camera_from_tanker: Isometry3<f64>,
-    pub(super) noise: PoseCovariance,
-}
-
-/// What one frame said.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Frame {
-    pub(super) stamp_ns: i64,
-    /// `None`: a frame without a pose.
-    pub(super) measured: Option<Measured>,
-    pub(super) lasting: Vec<LastingError>,
-}
 
 /// A frame, and what was believed before it.
 #[derive(Debug, Clone, PartialEq, Default)]

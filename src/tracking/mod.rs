@@ -17,6 +17,7 @@
 
 mod belief;
 mod filter;
+mod frame;
 mod history;
 mod lag;
 mod last_motion;
@@ -24,6 +25,7 @@ mod lasting;
 mod model;
 mod outcome;
 mod settings;
+mod state;
 mod symmetric6;
 mod track;
 

@@ -1,0 +1,155 @@
+//! A track or a candidate for one: how it begins with a frame, and what the next frame makes of it.
+
+use nalgebra::Vector3;
+
+use super::frame::{Frame, Measured};
+use super::lag::{Lag, MEMORY_FRAMES};
+use super::lasting::Lasting;
+use super::model::{Difference, Innovation, Noise, Transition, add_noise, advance};
+use super::settings::Checked;
+use super::track::{Track, seconds};
+use crate::geometry::{Matrix12, Motion, PoseCovariance};
+
+/// Why a pose does not correct a track or candidate.
+pub(super) enum Refused {
+    Contradicts { innovation_squared: f64 },
+    LostPrecision,
+}
+
+/// A track, or a candidate for one.
+#[derive(Debug, PartialEq)]
+pub(super) struct State {
+    pub(super) motion: StateMotion,
+    pub(super) lasting: Lasting,
+}
+
+/// The part of a state that has one size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StateMotion {
+    pub(super) stamp_ns: i64,
+    /// Its covariance is that given the lasting causes.
+    pub(super) given_causes: Motion,
+    pub(super) consistent_frames: u32,
+    pub(super) lag: Lag,
+}
+
+impl State {
+    /// Returns the motion with its whole covariance.
+    pub(super) fn track(&self) -> Track {
+        let mut motion = self.motion.given_causes;
+        self.lasting.add_to(&mut motion.covariance);
+        Track {
+            stamp_ns: self.motion.stamp_ns,
+            motion,
+        }
+    }
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        Self {
+            motion: self.motion,
+            lasting: self.lasting.clone(),
+        }
+    }
+
+    // Beliefs are copied for every frame: the memory is used again.
+    fn clone_from(&mut self, source: &Self) {
+        self.motion = source.motion;
+        self.lasting.clone_from(&source.lasting);
+    }
+}
+
+impl Checked {
+    pub(super) fn noise(&self, lag: &Lag) -> &Noise {
+        if lag.is_manoeuvring() {
+            &self.manoeuvre_noise
+        } else {
+            &self.noise
+        }
+    }
+
+    /// Makes a state the candidate that begins with a frame.
+    pub(super) fn begin(&self, state: &mut Option<State>, frame: &Frame, measured: &Measured) {
+        let mut lasting = state
+            .take()
+            .map_or_else(Lasting::default, |state| state.lasting);
+        let noise = measured.noise.0 + lasting.start(&frame.lasting);
+        let mut covariance = Matrix12::zeros();
+        covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&noise);
+        for axis in 0..3 {
+            covariance[(6 + axis, 6 + axis)] = self.initial_speed_variance;
+            covariance[(9 + axis, 9 + axis)] = self.initial_rate_variance;
+        }
+        let motion = StateMotion {
+            stamp_ns: frame.stamp_ns,
+            given_causes: Motion {
+                b_from_a: measured.camera_from_tanker,
+                velocity_in_b: Vector3::zeros(),
+                rate_in_b: Vector3::zeros(),
+                covariance,
+            },
+            consistent_frames: 1,
+            lag: Lag::default(),
+        };
+        *state = Some(State { motion, lasting });
+    }
+}
+
+/// Corrects a track or candidate by a pose after it, and returns the squared innovation. What contradicts it leaves it
+/// as it was.
+pub(super) fn step(
+    checked: &Checked,
+    scratch: &mut Lasting,
+    state: &mut State,
+    frame: &Frame,
+    measured: &Measured,
+) -> Result<f64, Refused> {
+    let StateMotion {
+        stamp_ns,
+        given_causes,
+        consistent_frames,
+        lag,
+    } = &state.motion;
+    let gap_s = seconds(frame.stamp_ns, *stamp_ns);
+    let transition = Transition::new(given_causes, gap_s);
+    let mut predicted = advance(given_causes, &transition, checked.noise(lag));
+    let difference = Difference::new(&predicted, &measured.camera_from_tanker);
+    scratch.clone_from(&state.lasting);
+    scratch.predict(gap_s, &transition, &mut predicted.covariance);
+    let noise = measured.noise.0 + scratch.see(&frame.lasting, &difference.turn);
+    let noise = PoseCovariance(noise);
+    let sums = scratch.sums();
+    let innovate = |from: &Motion| {
+        let covariance = from.pose_covariance();
+        Innovation::new(&difference, &covariance, &noise, sums.as_ref())
+            .ok_or(Refused::LostPrecision)
+    };
+    let mut innovation = innovate(&predicted)?;
+    let innovation_squared = innovation.squared;
+    if innovation_squared > checked.gate {
+        return Err(Refused::Contradicts { innovation_squared });
+    }
+    let next_lag = lag.with(&innovation.whitened, gap_s, checked.lag_limit);
+    if next_lag.is_manoeuvring() && !lag.is_manoeuvring() {
+        // It has lagged since it began to lean, so the larger noise is owed for that time too.
+        add_noise(
+            &mut predicted,
+            MEMORY_FRAMES * gap_s,
+            &checked.manoeuvre_noise,
+        );
+        innovation = innovate(&predicted)?;
+    }
+    let correction = innovation
+        .correct(&predicted, sums.as_ref())
+        .ok_or(Refused::LostPrecision)?;
+    scratch.correct(&correction);
+    std::mem::swap(&mut state.lasting, scratch);
+    state.motion = StateMotion {
+        stamp_ns: frame.stamp_ns,
+        given_causes: correction.motion,
+        consistent_frames: consistent_frames.saturating_add(1),
+        lag: next_lag,
+    };
+    Ok(innovation_squared)
+}
