@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::belief::Belief;
 use super::frame::{Frame, Measured, check};
 use super::history::{Entry, History, Place};
-use super::lasting::{Lasting, LastingError};
+use super::lasting::LastingError;
 use super::model::{Noise, predict};
 use super::outcome::{PredictError, StartReason, TrackOutcome};
 use super::settings::{Checked, CheckedFilterSettings, FilterSettings, FilterSettingsError};
@@ -25,8 +25,6 @@ pub struct Filter {
     checked: Checked,
     belief: Belief,
     history: History,
-    /// Room for a prediction.
-    scratch: Lasting,
 }
 
 impl From<CheckedFilterSettings> for Filter {
@@ -37,7 +35,6 @@ impl From<CheckedFilterSettings> for Filter {
             settings: *settings.settings(),
             belief: Belief::default(),
             history: History::default(),
-            scratch: Lasting::default(),
         }
     }
 }
@@ -185,8 +182,9 @@ impl Filter {
         let mut outcome = None;
         for at in at..history.len() {
             if let Some(Entry { frame, before }) = history.entry(at) {
-                before.clone_from(&self.belief);
-                let of_frame = self.follow(frame);
+                // Swapped, not copied: what is believed after it is made anew, in the old memory.
+                std::mem::swap(before, &mut self.belief);
+                let of_frame = self.follow(before, frame);
                 outcome.get_or_insert(of_frame);
             }
         }
@@ -206,14 +204,15 @@ impl Filter {
         Some(self.belief.state.as_ref()?.motion.stamp_ns)
     }
 
-    /// Goes on by one frame, in the order of stamps.
-    fn follow(&mut self, frame: &Frame) -> TrackOutcome {
+    /// Goes on by one frame, in the order of stamps: makes the belief after it.
+    fn follow(&mut self, before: &Belief, frame: &Frame) -> TrackOutcome {
         let stamp_ns = frame.stamp_ns;
-        let Some(state) = &mut self.belief.state else {
-            return match &frame.measured {
-                Some(measured) => self.start(frame, measured, StartReason::First),
-                None => TrackOutcome::Idle,
-            };
+        let Some(state) = &before.state else {
+            if let Some(measured) = &frame.measured {
+                return self.start(frame, measured, StartReason::First);
+            }
+            self.belief.clone_from(before);
+            return TrackOutcome::Idle;
         };
         let gap_s = seconds(stamp_ns, state.motion.stamp_ns);
         let restart = if gap_s > self.checked.max_gap_s {
@@ -228,6 +227,7 @@ impl Filter {
                 self.belief = Belief::default();
                 return TrackOutcome::Dropped { gap_s };
             }
+            self.belief.clone_from(before);
             return TrackOutcome::Coasting { gap_s };
         };
         if let Some(reason) = restart {
@@ -236,15 +236,22 @@ impl Filter {
         let needed = self.checked.confirm_frames;
         let limit = self.checked.gate;
         let was_confirmed = state.motion.consistent_frames >= needed;
-        match step(&self.checked, &mut self.scratch, state, frame, measured) {
+        match step(
+            &self.checked,
+            state,
+            &mut self.belief.state,
+            frame,
+            measured,
+        ) {
             Err(Refused::LostPrecision) => self.start(frame, measured, StartReason::LostPrecision),
             Err(Refused::Contradicts { innovation_squared }) if was_confirmed => {
-                self.challenge(frame, measured);
+                self.challenge(before.challenger.as_ref(), frame, measured);
                 let rival = self.belief.challenger.as_ref();
                 if rival.is_some_and(|rival| rival.motion.consistent_frames >= needed) {
                     self.belief.state = self.belief.challenger.take();
                     return TrackOutcome::Acquired;
                 }
+                self.belief.state.clone_from(&before.state);
                 TrackOutcome::Gated {
                     innovation_squared,
                     limit,
@@ -258,7 +265,7 @@ impl Filter {
                 self.start(frame, measured, reason)
             }
             Ok(innovation_squared) => {
-                let consistent_frames = state.motion.consistent_frames;
+                let consistent_frames = state.motion.consistent_frames.saturating_add(1);
                 self.belief.challenger = None;
                 if was_confirmed {
                     TrackOutcome::Updated { innovation_squared }
@@ -275,16 +282,16 @@ impl Filter {
     }
 
     /// Takes a pose that the gate has refused for the track that such poses may make.
-    fn challenge(&mut self, frame: &Frame, measured: &Measured) {
-        if let Some(rival) = &mut self.belief.challenger {
+    fn challenge(&mut self, rival: Option<&State>, frame: &Frame, measured: &Measured) {
+        let challenger = &mut self.belief.challenger;
+        if let Some(rival) = rival {
             let gap_s = seconds(frame.stamp_ns, rival.motion.stamp_ns);
             let is_next = gap_s > 0.0 && gap_s <= self.checked.max_gap_s;
-            if is_next && step(&self.checked, &mut self.scratch, rival, frame, measured).is_ok() {
+            if is_next && step(&self.checked, rival, challenger, frame, measured).is_ok() {
                 return;
             }
         }
-        self.checked
-            .begin(&mut self.belief.challenger, frame, measured);
+        self.checked.begin(challenger, frame, measured);
     }
 
     /// Returns track or candidate, the noise that drives it, and whether it is confirmed.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use super::lasting::LastingError;
-use super::model::symmetric;
+use super::matrix6::symmetric;
 use super::outcome::MeasurementError;
 use super::symmetric6::{Factor, rows};
 use crate::geometry::PoseCovariance;

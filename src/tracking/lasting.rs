@@ -25,7 +25,8 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
-use super::model::{Correction, LastingSums, Transition, turned};
+use super::matrix6::times_vector;
+use super::model::{Blocks, Correction, LastingSums, Transition, turned};
 use crate::geometry::{Matrix12, Vector12, principal_root};
 
 /// Largest number of causes with a column each. The smaller ones of a larger budget are combined. A time constant
@@ -55,6 +56,8 @@ struct Column {
     rates: Vector6<f64>,
     /// Its column of `B`; zero if the frame is not affected.
     shift: Vector6<f64>,
+    /// Its column of `W`.
+    seen: Vector6<f64>,
 }
 
 impl Column {
@@ -65,12 +68,8 @@ impl Column {
             pose: Vector6::zeros(),
             rates: Vector6::zeros(),
             shift: error.shift,
+            seen: error.shift,
         }
-    }
-
-    /// Its column of `W`.
-    fn seen(&self) -> Vector6<f64> {
-        self.pose + self.shift
     }
 }
 
@@ -103,27 +102,41 @@ impl Lasting {
         noise
     }
 
-    /// Propagates in time. The variance that is no longer common to before and after goes into `added`.
-    pub(super) fn predict(&mut self, dt_s: f64, transition: &Transition, added: &mut Matrix12) {
+    /// Propagates the causes of another state in time, without shifts. The variance that is no longer common to before and
+    /// after goes into `added`.
+    #[inline(always)]
+    pub(super) fn predict_from(
+        &mut self,
+        before: &Self,
+        dt_s: f64,
+        transition: &Transition,
+        added: &mut Blocks,
+    ) {
+        self.columns.clear();
+        self.columns
+            .extend(before.columns.iter().map(|column| Column {
+                pose: transition.of_pose(&column.pose, &column.rates),
+                shift: Vector6::zeros(),
+                ..*column
+            }));
         for column in &mut self.columns {
-            column.pose = transition.of_pose(&column.pose, &column.rates);
             let Some(time_constant_s) = column.time_constant_s else {
                 continue;
             };
             let kept = (-dt_s / time_constant_s).exp();
             let lost = 1.0 - kept * kept;
-            add_outer(added, column, lost);
+            added.pose.ger(lost, &column.pose, &column.pose, 1.0);
+            added.cross.ger(lost, &column.pose, &column.rates, 1.0);
+            added.rates.ger(lost, &column.rates, &column.rates, 1.0);
             column.pose *= kept;
             column.rates *= kept;
         }
     }
 
-    /// Sets the shifts of a frame, whose attitude errors are rotated by `turn`. Returns the covariance of causes with a
-    /// time constant that have no column of their own: they are combined as constant, and count as noise as well.
+    /// Sets the shifts of a frame, whose attitude errors are rotated by `turn`; before, all are zero. Returns the
+    /// covariance of causes with a time constant that have no column of their own: they are combined as constant, and
+    /// count as noise as well.
     pub(super) fn see(&mut self, errors: &[LastingError], turn: &Matrix3<f64>) -> Matrix6<f64> {
-        for column in &mut self.columns {
-            column.shift = Vector6::zeros();
-        }
         let mut together = Matrix6::zeros();
         let mut noise = Matrix6::zeros();
         // Frames list their causes in about the same order, so the search starts at the next one.
@@ -150,6 +163,9 @@ impl Lasting {
         }
         if together != Matrix6::zeros() {
             self.see_together(&together);
+        }
+        for column in &mut self.columns {
+            column.seen = column.pose + column.shift;
         }
         noise
     }
@@ -180,34 +196,38 @@ impl Lasting {
     }
 
     /// Returns the sums for innovation and gain; `None` without causes.
+    #[inline(always)]
     pub(super) fn sums(&self) -> Option<LastingSums> {
-        let mut sums = LastingSums {
-            seen: Matrix6::zeros(),
-            seen_pose: Matrix6::zeros(),
-            seen_rates: Matrix6::zeros(),
-            seen_shift: Matrix6::zeros(),
-        };
-        for column in &self.columns {
-            let seen = column.seen();
-            for (sum, other) in [
-                (&mut sums.seen, &seen),
-                (&mut sums.seen_pose, &column.pose),
-                (&mut sums.seen_rates, &column.rates),
-                (&mut sums.seen_shift, &column.shift),
-            ] {
-                sum.ger(1.0, &seen, other, 1.0);
+        // Two columns at a time: they stay in registers.
+        let sum = |other: fn(&Column) -> &Vector6<f64>| {
+            let mut sums = Matrix6::zeros();
+            for (pair, to) in sums.data.0.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+                let mut sum = [[0.0; 6]; 2];
+                for column in &self.columns {
+                    let (seen, other) = (&column.seen.data.0[0], &other(column).data.0[0]);
+                    for side in 0..2 {
+                        for row in 0..6 {
+                            sum[side][row] += seen[row] * other[2 * pair + side];
+                        }
+                    }
+                }
+                *to = sum;
             }
-        }
-        (!self.columns.is_empty()).then_some(sums)
+            sums
+        };
+        (!self.columns.is_empty()).then(|| LastingSums {
+            pose: sum(|column| &column.pose),
+            rates: sum(|column| &column.rates),
+            shift: sum(|column| &column.shift),
+        })
     }
 
     /// Applies a correction of the motion: `U − K W`.
     pub(super) fn correct(&mut self, correction: &Correction) {
         for column in &mut self.columns {
-            let seen = column.seen();
-            let pose = column.pose - correction.pose_gain_t.tr_mul(&seen);
+            let pose = column.pose - times_vector(&correction.pose_gain, &column.seen);
             column.pose = turned(&pose, &correction.reset);
-            column.rates -= correction.rates_gain_t.tr_mul(&seen);
+            column.rates -= times_vector(&correction.rates_gain, &column.seen);
         }
     }
 

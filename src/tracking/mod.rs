@@ -22,6 +22,7 @@ mod history;
 mod lag;
 mod last_motion;
 mod lasting;
+mod matrix6;
 mod model;
 mod outcome;
 mod settings;

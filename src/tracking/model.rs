@@ -12,8 +12,9 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
+use super::matrix6::{symmetric, times, times_vector, turn_columns, turn_rows};
 use super::symmetric6::{Factor, rows};
-use crate::geometry::{Motion, PoseCovariance, left_jacobian, left_jacobian_inverse, pose_error};
+use crate::geometry::{Matrix12, Motion, left_jacobian, left_jacobian_inverse, pose_error};
 
 /// Two-sided spectral densities, squared: the increase of a variance per second.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,20 +36,16 @@ impl Noise {
 }
 
 /// `Σ` in blocks.
-struct Blocks {
-    pose: Matrix6<f64>,
-    cross: Matrix6<f64>,
-    rates: Matrix6<f64>,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Blocks {
+    pub(super) pose: Matrix6<f64>,
+    pub(super) cross: Matrix6<f64>,
+    pub(super) rates: Matrix6<f64>,
 }
 
 impl Blocks {
-    fn of(motion: &Motion) -> Self {
-        let block = |row, column| {
-            motion
-                .covariance
-                .fixed_view::<6, 6>(row, column)
-                .into_owned()
-        };
+    fn of(covariance: &Matrix12) -> Self {
+        let block = |row, column| covariance.fixed_view::<6, 6>(row, column).into_owned();
         Self {
             pose: block(0, 0),
             cross: block(0, 6),
@@ -56,55 +53,74 @@ impl Blocks {
         }
     }
 
-    fn store(&self, motion: &mut Motion) {
+    fn whole(&self) -> Matrix12 {
+        let mut covariance = Matrix12::zeros();
         let mut put = |row, column, block: &Matrix6<f64>| {
-            motion
-                .covariance
+            covariance
                 .fixed_view_mut::<6, 6>(row, column)
                 .copy_from(block);
         };
-        put(0, 0, &symmetric(&self.pose));
+        put(0, 0, &self.pose);
         put(0, 6, &self.cross);
         put(6, 0, &self.cross.transpose());
-        put(6, 6, &symmetric(&self.rates));
+        put(6, 6, &self.rates);
+        covariance
     }
-}
 
-impl Blocks {
+    #[inline(always)]
     fn is_positive_definite(&self) -> bool {
-        let schur =
-            |factor: Factor| self.rates - self.cross.transpose() * (factor.inverse() * self.cross);
-        Factor::new(&rows(&self.pose))
-            .map(schur)
-            .is_some_and(|rest| Factor::new(&rows(&rest)).is_some())
+        Factor::new(&rows(&self.pose)).is_some_and(|factor| {
+            let rest = self.rates - factor.explained(&self.cross);
+            Factor::new(&rows(&rest)).is_some()
+        })
+    }
+
+    /// Returns it without the rounding by which it is not symmetric.
+    #[inline(always)]
+    fn symmetric(&self) -> Self {
+        Self {
+            pose: symmetric(&self.pose),
+            cross: self.cross,
+            rates: symmetric(&self.rates),
+        }
     }
 }
 
-pub(super) fn symmetric(m: &Matrix6<f64>) -> Matrix6<f64> {
-    (m + m.transpose()) * 0.5
+/// A [`Motion`] with its covariance in blocks, as the filter computes with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BlockMotion {
+    pub(super) b_from_a: Isometry3<f64>,
+    pub(super) velocity_in_b: Vector3<f64>,
+    pub(super) rate_in_b: Vector3<f64>,
+    pub(super) covariance: Blocks,
 }
 
-/// Returns `diag(I, r) m`: only attitudes are rotated.
-fn turn_rows(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
-    let turned = r * m.fixed_rows::<3>(3);
-    m.fixed_rows_mut::<3>(3).copy_from(&turned);
-    m
-}
+impl BlockMotion {
+    pub(super) fn of(motion: &Motion) -> Self {
+        Self {
+            b_from_a: motion.b_from_a,
+            velocity_in_b: motion.velocity_in_b,
+            rate_in_b: motion.rate_in_b,
+            covariance: Blocks::of(&motion.covariance),
+        }
+    }
 
-/// Returns `m diag(I, r)ᵀ`.
-fn turn_columns(mut m: Matrix6<f64>, r: &Matrix3<f64>) -> Matrix6<f64> {
-    let turned = m.fixed_columns::<3>(3) * r.transpose();
-    m.fixed_columns_mut::<3>(3).copy_from(&turned);
-    m
+    pub(super) fn motion(&self) -> Motion {
+        Motion {
+            b_from_a: self.b_from_a,
+            velocity_in_b: self.velocity_in_b,
+            rate_in_b: self.rate_in_b,
+            covariance: self.covariance.whole(),
+        }
+    }
 }
 
 /// Returns `diag(I, r) v`: only attitudes are rotated.
+#[inline(always)]
 pub(super) fn turned(v: &Vector6<f64>, r: &Matrix3<f64>) -> Vector6<f64> {
-    let mut turned = *v;
-    turned
-        .fixed_rows_mut::<3>(3)
-        .copy_from(&(r * v.fixed_rows::<3>(3)));
-    turned
+    let (r, [a, b, c, x, y, z]) = (&r.data.0, v.data.0[0]);
+    let row = |row: usize| r[0][row] * x + r[1][row] * y + r[2][row] * z;
+    Vector6::new(a, b, c, row(0), row(1), row(2))
 }
 
 /// Propagation of errors of the pose: `Φ` and `Γ`.
@@ -116,7 +132,7 @@ pub(super) struct Transition {
 }
 
 impl Transition {
-    pub(super) fn new(motion: &Motion, dt_s: f64) -> Self {
+    pub(super) fn new(motion: &BlockMotion, dt_s: f64) -> Self {
         let by = motion.rate_in_b * dt_s;
         let turn = UnitQuaternion::from_scaled_axis(by);
         Self {
@@ -128,6 +144,7 @@ impl Transition {
     }
 
     /// Returns the error of the pose after the step, from errors of pose, and of velocity and rate, before it.
+    #[inline(always)]
     pub(super) fn of_pose(&self, pose: &Vector6<f64>, rates: &Vector6<f64>) -> Vector6<f64> {
         turned(pose, &self.phi) + turned(rates, &self.gamma) * self.dt_s
     }
@@ -135,18 +152,20 @@ impl Transition {
 
 /// Returns `motion` predicted by `dt_s ≥ 0`.
 pub(super) fn predict(motion: &Motion, dt_s: f64, noise: &Noise) -> Motion {
-    advance(motion, &Transition::new(motion, dt_s), noise)
+    let motion = BlockMotion::of(motion);
+    advance(&motion, &Transition::new(&motion, dt_s), noise).motion()
 }
 
 /// Returns `motion` after a transition that was made for it.
-pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -> Motion {
+#[inline(always)]
+pub(super) fn advance(motion: &BlockMotion, transition: &Transition, noise: &Noise) -> BlockMotion {
     let Transition {
         dt_s,
         turn,
         phi,
         gamma,
     } = *transition;
-    let before = Blocks::of(motion);
+    let before = &motion.covariance;
     let kept = turn_rows(before.cross, &phi);
     let gained = turn_rows(before.rates, &gamma) * dt_s;
     let crossed = turn_columns(kept, &gamma) * dt_s;
@@ -158,54 +177,54 @@ pub(super) fn advance(motion: &Motion, transition: &Transition, noise: &Noise) -
         cross: kept + gained,
         rates: before.rates,
     };
-    let mut predicted = *motion;
-    predicted.b_from_a = Isometry3::from_parts(
-        Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
-        // The norm of products of unit quaternions drifts by rounding.
-        UnitQuaternion::new_normalize((turn * motion.b_from_a.rotation).into_inner()),
-    );
-    after.store(&mut predicted);
+    let mut predicted = BlockMotion {
+        b_from_a: Isometry3::from_parts(
+            Translation3::from(motion.b_from_a.translation.vector + motion.velocity_in_b * dt_s),
+            // The norm of products of unit quaternions drifts by rounding.
+            UnitQuaternion::new_normalize((turn * motion.b_from_a.rotation).into_inner()),
+        ),
+        velocity_in_b: motion.velocity_in_b,
+        rate_in_b: motion.rate_in_b,
+        covariance: after.symmetric(),
+    };
     add_noise(&mut predicted, dt_s, noise);
     predicted
 }
 
 /// Adds the effect of white noise of acceleration over `time_s`.
-pub(super) fn add_noise(motion: &mut Motion, time_s: f64, noise: &Noise) {
-    let covariance = &mut motion.covariance;
+#[inline(always)]
+pub(super) fn add_noise(motion: &mut BlockMotion, time_s: f64, noise: &Noise) {
+    let Blocks { pose, cross, rates } = &mut motion.covariance;
     for axis in 0..6 {
         let q = if axis < 3 {
             noise.acceleration
         } else {
             noise.angular_acceleration
         };
-        let crossed = q * time_s.powi(2) / 2.0;
-        covariance[(axis, axis)] += q * time_s.powi(3) / 3.0;
-        covariance[(axis, 6 + axis)] += crossed;
-        covariance[(6 + axis, axis)] += crossed;
-        covariance[(6 + axis, 6 + axis)] += q * time_s;
+        pose[(axis, axis)] += q * time_s.powi(3) / 3.0;
+        cross[(axis, axis)] += q * time_s.powi(2) / 2.0;
+        rates[(axis, axis)] += q * time_s;
     }
 }
 
 /// Sums over all lasting causes: `U` their covariance with the motion, `B` their shifts of the measured pose,
-/// `W = H U + B` their effect on the innovation.
+/// `W = H U + B` their effect on the innovation. `W Wᵀ` is the sum of the first and the last.
 pub(super) struct LastingSums {
-    /// `W Wᵀ`.
-    pub(super) seen: Matrix6<f64>,
     /// `W Uᵀ`, of the pose.
-    pub(super) seen_pose: Matrix6<f64>,
+    pub(super) pose: Matrix6<f64>,
     /// `W Uᵀ`, of velocity and rate.
-    pub(super) seen_rates: Matrix6<f64>,
+    pub(super) rates: Matrix6<f64>,
     /// `W Bᵀ`.
-    pub(super) seen_shift: Matrix6<f64>,
+    pub(super) shift: Matrix6<f64>,
 }
 
 /// A corrected motion, with the gains.
 pub(super) struct Correction {
-    pub(super) motion: Motion,
-    /// `K` of the pose, transposed.
-    pub(super) pose_gain_t: Matrix6<f64>,
-    /// `K` of velocity and rate, transposed.
-    pub(super) rates_gain_t: Matrix6<f64>,
+    pub(super) motion: BlockMotion,
+    /// `K` of the pose.
+    pub(super) pose_gain: Matrix6<f64>,
+    /// `K` of velocity and rate.
+    pub(super) rates_gain: Matrix6<f64>,
     /// Converts errors of the attitude to errors about the corrected one.
     pub(super) reset: Matrix3<f64>,
 }
@@ -233,7 +252,7 @@ pub(super) struct Difference {
 }
 
 impl Difference {
-    pub(super) fn new(predicted: &Motion, b_from_a: &Isometry3<f64>) -> Self {
+    pub(super) fn new(predicted: &BlockMotion, b_from_a: &Isometry3<f64>) -> Self {
         let by = pose_error(b_from_a, &predicted.b_from_a);
         Self {
             by,
@@ -251,15 +270,15 @@ impl Innovation {
     /// * `lasting`: sums over the lasting causes; `None` without any.
     pub(super) fn new(
         difference: &Difference,
-        covariance: &PoseCovariance,
-        noise: &PoseCovariance,
+        covariance: &Matrix6<f64>,
+        noise: &Matrix6<f64>,
         lasting: Option<&LastingSums>,
     ) -> Option<Self> {
         let turn = &difference.turn;
-        let noise = symmetric(&turn_columns(turn_rows(noise.0, turn), turn));
-        let mut sum = covariance.0 + noise;
+        let noise = symmetric(&turn_columns(turn_rows(*noise, turn), turn));
+        let mut sum = covariance + noise;
         if let Some(sums) = lasting {
-            sum += symmetric(&sums.seen);
+            sum += symmetric(&(sums.pose + sums.shift));
         }
         let factor = Factor::new(&rows(&sum))?;
         let whitened = Vector6::from(factor.whiten(&difference.by.into()));
@@ -275,45 +294,49 @@ impl Innovation {
 
     /// Returns the motion corrected by the measurement; `None` if its covariance would not be positive definite.
     /// Covariances of motions are those given the lasting causes.
+    #[inline(always)]
     pub(super) fn correct(
         &self,
-        predicted: &Motion,
+        predicted: &BlockMotion,
         lasting: Option<&LastingSums>,
     ) -> Option<Correction> {
-        let before = Blocks::of(predicted);
+        let before = &predicted.covariance;
         // Transposed gains, S⁻¹ A and S⁻¹ B, and (I − A S⁻¹)ᵀ = S⁻¹ N; with causes their terms are added.
-        let mut pose_gain_t = self.inverse * before.pose;
-        let mut rates_gain_t = self.inverse * before.cross;
-        let mut rest_t = self.inverse * self.noise;
+        let (mut pose, mut cross, mut rest) = (before.pose, before.cross, self.noise);
         if let Some(sums) = lasting {
-            pose_gain_t += self.inverse * sums.seen_pose;
-            rates_gain_t += self.inverse * sums.seen_rates;
-            rest_t += self.inverse * sums.seen_shift;
+            pose += sums.pose;
+            cross += sums.rates;
+            rest += sums.shift;
         }
+        let pose_gain_t = times(&self.inverse, &pose);
+        let rates_gain_t = times(&self.inverse, &cross);
+        let rest_t = times(&self.inverse, &rest);
+        let (pose_gain, rates_gain) = (pose_gain_t.transpose(), rates_gain_t.transpose());
         let rest = rest_t.transpose();
+        let kept = times(&rest, &before.pose);
+        let added = times(&pose_gain, &self.noise);
         let mut after = Blocks {
-            pose: rest * before.pose * rest_t + pose_gain_t.transpose() * self.noise * pose_gain_t,
-            cross: rest * before.cross,
-            rates: before.rates - before.cross.transpose() * rates_gain_t,
+            pose: times(&kept, &rest_t) + times(&added, &pose_gain_t),
+            cross: times(&rest, &before.cross),
+            rates: before.rates,
         };
+        let mut learned = before.cross;
         if lasting.is_some() {
-            // The gain is not optimal given the causes, so terms that cancel in the two lines above do not cancel here.
-            let slipped = self.noise * rates_gain_t;
-            after.cross += pose_gain_t.tr_mul(&slipped) - rest * (before.pose * rates_gain_t);
-            after.rates += rates_gain_t.tr_mul(&(before.pose * rates_gain_t + slipped))
-                - rates_gain_t.tr_mul(&before.cross);
+            // The gain is not optimal given the causes, so these terms do not cancel.
+            after.cross += times(&(added - kept), &rates_gain_t);
+            learned = learned * 2.0 - times(&(before.pose + self.noise), &rates_gain_t);
         }
+        after.rates -= times(&rates_gain, &learned);
 
-        let pose_step = pose_gain_t.tr_mul(&self.difference);
-        let rates_step = rates_gain_t.tr_mul(&self.difference);
+        let pose_step = times_vector(&pose_gain, &self.difference);
+        let rates_step = times_vector(&rates_gain, &self.difference);
         let turn: Vector3<f64> = pose_step.fixed_rows::<3>(3).into_owned();
         // The remaining error is now about the corrected attitude.
         let reset = left_jacobian(turn);
         after.pose = turn_columns(turn_rows(after.pose, &reset), &reset);
         after.cross = turn_rows(after.cross, &reset);
 
-        let mut corrected = *predicted;
-        corrected.b_from_a = Isometry3::from_parts(
+        let b_from_a = Isometry3::from_parts(
             Translation3::from(
                 predicted.b_from_a.translation.vector + pose_step.fixed_rows::<3>(0),
             ),
@@ -321,13 +344,16 @@ impl Innovation {
                 (UnitQuaternion::from_scaled_axis(turn) * predicted.b_from_a.rotation).into_inner(),
             ),
         );
-        corrected.velocity_in_b += rates_step.fixed_rows::<3>(0);
-        corrected.rate_in_b += rates_step.fixed_rows::<3>(3);
-        after.store(&mut corrected);
-        after.is_positive_definite().then_some(Correction {
-            motion: corrected,
-            pose_gain_t,
-            rates_gain_t,
+        let after = after.symmetric();
+        after.is_positive_definite().then(|| Correction {
+            motion: BlockMotion {
+                b_from_a,
+                velocity_in_b: predicted.velocity_in_b + rates_step.fixed_rows::<3>(0),
+                rate_in_b: predicted.rate_in_b + rates_step.fixed_rows::<3>(3),
+                covariance: after,
+            },
+            pose_gain,
+            rates_gain,
             reset,
         })
     }

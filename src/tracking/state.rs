@@ -1,14 +1,15 @@
 //! A track or a candidate for one: how it begins with a frame, and what the next frame makes of it.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3};
 
 use super::frame::{Frame, Measured};
 use super::lag::{Lag, MEMORY_FRAMES};
 use super::lasting::Lasting;
-use super::model::{Difference, Innovation, Noise, Transition, add_noise, advance};
+use super::model::{
+    BlockMotion, Blocks, Difference, Innovation, Noise, Transition, add_noise, advance,
+};
 use super::settings::Checked;
 use super::track::{Track, seconds};
-use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
 /// Why a pose does not correct a track or candidate.
 pub(super) enum Refused {
@@ -28,7 +29,7 @@ pub(super) struct State {
 pub(super) struct StateMotion {
     pub(super) stamp_ns: i64,
     /// Its covariance is that given the lasting causes.
-    pub(super) given_causes: Motion,
+    pub(super) given_causes: BlockMotion,
     pub(super) consistent_frames: u32,
     pub(super) lag: Lag,
 }
@@ -36,7 +37,7 @@ pub(super) struct StateMotion {
 impl State {
     /// Returns the motion with its whole covariance.
     pub(super) fn track(&self) -> Track {
-        let mut motion = self.motion.given_causes;
+        let mut motion = self.motion.given_causes.motion();
         self.lasting.add_to(&mut motion.covariance);
         Track {
             stamp_ns: self.motion.stamp_ns,
@@ -74,16 +75,18 @@ impl Checked {
         let mut lasting = state
             .take()
             .map_or_else(Lasting::default, |state| state.lasting);
-        let noise = measured.noise.0 + lasting.start(&frame.lasting);
-        let mut covariance = Matrix12::zeros();
-        covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&noise);
+        let mut covariance = Blocks {
+            pose: measured.noise.0 + lasting.start(&frame.lasting),
+            cross: Matrix6::zeros(),
+            rates: Matrix6::zeros(),
+        };
         for axis in 0..3 {
-            covariance[(6 + axis, 6 + axis)] = self.initial_speed_variance;
-            covariance[(9 + axis, 9 + axis)] = self.initial_rate_variance;
+            covariance.rates[(axis, axis)] = self.initial_speed_variance;
+            covariance.rates[(3 + axis, 3 + axis)] = self.initial_rate_variance;
         }
         let motion = StateMotion {
             stamp_ns: frame.stamp_ns,
-            given_causes: Motion {
+            given_causes: BlockMotion {
                 b_from_a: measured.camera_from_tanker,
                 velocity_in_b: Vector3::zeros(),
                 rate_in_b: Vector3::zeros(),
@@ -96,12 +99,14 @@ impl Checked {
     }
 }
 
-/// Corrects a track or candidate by a pose after it, and returns the squared innovation. What contradicts it leaves it
-/// as it was.
+/// Corrects a track or candidate by a pose after it, and returns the squared innovation.
+///
+/// # Inputs
+/// * `after`: takes what is believed then; without meaning where the pose is refused. Its memory is used again.
 pub(super) fn step(
     checked: &Checked,
-    scratch: &mut Lasting,
-    state: &mut State,
+    before: &State,
+    after: &mut Option<State>,
     frame: &Frame,
     measured: &Measured,
 ) -> Result<f64, Refused> {
@@ -110,19 +115,26 @@ pub(super) fn step(
         given_causes,
         consistent_frames,
         lag,
-    } = &state.motion;
+    } = &before.motion;
+    let after = after.get_or_insert_with(|| State {
+        motion: before.motion,
+        lasting: Lasting::default(),
+    });
+    let lasting = &mut after.lasting;
     let gap_s = seconds(frame.stamp_ns, *stamp_ns);
     let transition = Transition::new(given_causes, gap_s);
     let mut predicted = advance(given_causes, &transition, checked.noise(lag));
     let difference = Difference::new(&predicted, &measured.camera_from_tanker);
-    scratch.clone_from(&state.lasting);
-    scratch.predict(gap_s, &transition, &mut predicted.covariance);
-    let noise = measured.noise.0 + scratch.see(&frame.lasting, &difference.turn);
-    let noise = PoseCovariance(noise);
-    let sums = scratch.sums();
-    let innovate = |from: &Motion| {
-        let covariance = from.pose_covariance();
-        Innovation::new(&difference, &covariance, &noise, sums.as_ref())
+    lasting.predict_from(
+        &before.lasting,
+        gap_s,
+        &transition,
+        &mut predicted.covariance,
+    );
+    let noise = measured.noise.0 + lasting.see(&frame.lasting, &difference.turn);
+    let sums = lasting.sums();
+    let innovate = |from: &BlockMotion| {
+        Innovation::new(&difference, &from.covariance.pose, &noise, sums.as_ref())
             .ok_or(Refused::LostPrecision)
     };
     let mut innovation = innovate(&predicted)?;
@@ -143,9 +155,8 @@ pub(super) fn step(
     let correction = innovation
         .correct(&predicted, sums.as_ref())
         .ok_or(Refused::LostPrecision)?;
-    scratch.correct(&correction);
-    std::mem::swap(&mut state.lasting, scratch);
-    state.motion = StateMotion {
+    lasting.correct(&correction);
+    after.motion = StateMotion {
         stamp_ns: frame.stamp_ns,
         given_causes: correction.motion,
         consistent_frames: consistent_frames.saturating_add(1),

@@ -1,6 +1,8 @@
 //! Symmetric 6×6 matrices, factored as `L D Lᵀ` with loops that the compiler can unroll.
 
-use nalgebra::Matrix6;
+use nalgebra::{ArrayStorage, Matrix6};
+
+use super::matrix6::times;
 
 type Vector = [f64; 6];
 
@@ -69,6 +71,29 @@ impl Factor {
         std::array::from_fn(|i| x[i] * self.inverse_d[i].sqrt())
     }
 
+    /// Returns `bᵀ A⁻¹ b`.
+    #[inline(always)]
+    pub(super) fn explained(&self, b: &Matrix6<f64>) -> Matrix6<f64> {
+        // Rows of L⁻¹ b, as columns.
+        let mut x = b.transpose().data.0;
+        for i in 0..6 {
+            for k in 0..i {
+                let known = x[k];
+                for (x, known) in x[i].iter_mut().zip(known) {
+                    *x -= self.l[i][k] * known;
+                }
+            }
+        }
+        let x = Matrix6::from_data(ArrayStorage(x));
+        let mut weighted = x;
+        for (column, inverse_d) in weighted.data.0.iter_mut().zip(self.inverse_d) {
+            for value in column {
+                *value *= inverse_d;
+            }
+        }
+        times(&x, &weighted.transpose())
+    }
+
     /// Returns `A⁻¹`, exactly symmetric.
     #[inline(always)]
     pub(super) fn inverse(&self) -> Matrix6<f64> {
@@ -123,6 +148,8 @@ mod tests {
             let inverse = expected.inverse();
             assert!((factor.inverse() - inverse).norm() < ROUNDING * inverse.norm());
             assert_eq!(factor.inverse(), factor.inverse().transpose());
+            let explained = half.transpose() * inverse * half;
+            assert!((factor.explained(&half) - explained).norm() < ROUNDING * explained.norm());
         }
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::{Strategy, prop, prop_assert, proptest};
 
-use super::super::model::{Difference, Innovation, Noise, predict};
+use super::super::model::{BlockMotion, Difference, Innovation, Noise, predict};
 use super::super::{Filter, FilterSettings, StartReason, TrackOutcome};
 use super::{EPOCH_NS, pose};
 use crate::geometry::{Matrix12, Motion, PoseCovariance, left_jacobian, motion_error, set};
@@ -77,13 +77,15 @@ fn an_update_is_the_textbook_one() {
     // Without a difference in attitude nothing turns, and the plain formula holds.
     let mut measured = predicted.b_from_a;
     measured.translation.vector += Vector3::new(0.05, -0.02, 0.1);
-    let difference = Difference::new(&predicted, &measured);
-    let innovation = Innovation::new(&difference, &predicted.pose_covariance(), &noise, None)
+    let in_blocks = BlockMotion::of(&predicted);
+    let difference = Difference::new(&in_blocks, &measured);
+    let innovation = Innovation::new(&difference, &in_blocks.covariance.pose, &noise.0, None)
         .expect("positive definite");
     let corrected = innovation
-        .correct(&predicted, None)
+        .correct(&in_blocks, None)
         .expect("positive definite")
-        .motion;
+        .motion
+        .motion();
 
     let p = predicted.covariance;
     let s = p.fixed_view::<6, 6>(0, 0) + noise.0;
