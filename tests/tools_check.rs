@@ -127,7 +127,8 @@ fn exit_codes_tell_fine_from_findings_from_unreadable() {
         env!("CARGO_MANIFEST_DIR"),
         "/config/tankers/budget_example.yaml"
     );
-    let fine = check(&["--marker-map", example, "--to-m", "15", "--required-m", "3"]);
+    let near = ["--marker-map", example, "--from-m", "25", "--to-m", "15"];
+    let fine = check(&[&near[..], &["--required-m", "3"]].concat());
     assert_eq!(code(&fine), 0, "{}", text(&fine.stdout));
     let found = check(&[
         "--marker-map",

@@ -56,6 +56,25 @@ pub fn check_together(parameters: &Parameters) -> Result<(), TogetherError> {
             missing: KEYS.publish_integrity.name(),
         });
     }
+    let priors = [
+        (
+            &KEYS.nominal_attitude_sigma_deg,
+            values.nominal_attitude_sigma_deg,
+        ),
+        (
+            &KEYS.reported_attitude_sigma_deg,
+            values.reported_attitude_sigma_deg,
+        ),
+    ];
+    if let (true, Some((prior, _))) = (
+        values.publish_integrity,
+        priors.iter().find(|(_, sigma_deg)| *sigma_deg > 0.0),
+    ) {
+        return Err(TogetherError::UnmonitoredPrior {
+            output: KEYS.publish_integrity.name(),
+            prior: prior.name(),
+        });
+    }
     if values.publish_integrity && values.refinement != Refinement::MaximumLikelihood {
         return Err(TogetherError::NotMaximumLikelihood {
             output: KEYS.publish_integrity.name(),
@@ -111,5 +130,13 @@ pub enum TogetherError {
         sigma: &'static str,
         /// The parameter that is missing.
         needs: &'static str,
+    },
+    /// A prior of the attitude that nothing monitors.
+    #[error("{output} does not go with {prior}: nothing monitors whether the tanker keeps to it")]
+    UnmonitoredPrior {
+        /// The parameter that switches protection levels on.
+        output: &'static str,
+        /// The parameter that states the prior.
+        prior: &'static str,
     },
 }

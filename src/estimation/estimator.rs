@@ -123,6 +123,20 @@ impl Estimator {
         budget::frame_causes(self.budget.as_ref(), prior, camera, observations, solution)
     }
 
+    /// Returns the pose of all these points, none left out, and however few they are.
+    ///
+    /// # Errors
+    /// As [`Self::estimate`].
+    pub(crate) fn estimate_of_all(
+        &self,
+        camera: &Camera,
+        observations: &[Observation],
+    ) -> Result<Solution, EstimateError> {
+        let floored = with_sigma_floor(observations, self.settings.min_points);
+        let observations = floored.as_deref().unwrap_or(observations);
+        self.estimate_with_all(camera, observations, &Expected::default())
+    }
+
     /// Returns a frame linearised at its solution, without the points that it leaves out; `None` for an estimate that
     /// is not maximum likelihood, or where a point has no pixel at the pose.
     ///

@@ -109,7 +109,7 @@ pub enum Unavailable {
 pub enum Unmonitored {
     /// More faulty beacons at once than are monitored.
     Several,
-    /// Too few points remain without the suspects.
+    /// The points without the suspects are too few, or allow a second pose.
     TooFewPoints,
     /// The second pose.
     SecondPose,
@@ -143,7 +143,7 @@ impl Unmonitored {
     fn in_words(self) -> &'static str {
         match self {
             Self::Several => "more beacons may fail at once than are monitored",
-            Self::TooFewPoints => "without the suspects too few points remain",
+            Self::TooFewPoints => "without the suspects the other points do not fix one pose",
             Self::SecondPose => "the image nearly allows a second pose",
         }
     }

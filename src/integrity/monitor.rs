@@ -11,12 +11,18 @@ use super::level::{Along, Risk};
 use super::projection::Projection;
 use super::separation::{Separations, Suspicion};
 use crate::camera::Camera;
-use crate::estimation::{Estimator, LinearFrame, Observation, Solution};
+use crate::estimation::{Estimator, LinearFrame, Observation, Refinement, Solution};
 use crate::geometry::{PoseCovariance, skew};
 use crate::target::MarkerMap;
 
 /// Points that must remain without the suspects: three fix up to four poses.
 const LEAST_REMAINING: usize = 4;
+/// rad, 10°; beyond it the error does not follow the covariance.
+const MOST_ATTITUDE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
+/// Sigmas of the attitude without a beacon: farther, a pose without it is another one.
+const MOST_TURN_SIGMAS: f64 = 10.0;
+/// Thickness of a target over its length below which it counts as flat.
+const FLAT: f64 = 0.02;
 /// Share of the risk that is kept for frames in which detections were left out: each choice of them is one more way to
 /// be wrong.
 const SHARE_OF_EXCLUSIONS: f64 = 0.1;
@@ -112,22 +118,34 @@ impl IntegrityMonitor {
     ) -> Result<FrameIntegrity, Unavailable> {
         let linear = estimator
             .linearised(camera, observations, solution)
-            .ok_or(Unavailable::NotMaximumLikelihood)?;
+            .ok_or(match estimator.settings().refinement {
+                Refinement::MaximumLikelihood => Unavailable::Singular,
+                Refinement::None => Unavailable::NotMaximumLikelihood,
+            })?;
         let beacon_of = |id| {
             map.and_then(|map| map.tag_of_corner(id))
                 .map_or(Beacon::Marker(id), |tag| Beacon::Tag(tag.id))
         };
         let units = units(&linear.ids, beacon_of);
-        let projection = Projection::new(&linear).ok_or(Unavailable::Singular)?;
-        let frame = self
-            .frame(&linear, &projection, solution)
-            .ok_or(Unavailable::Singular)?;
         let plan = Plan::new(
             &self.settings,
             units.len(),
             linear.flex_modes,
             linear.modes - linear.flex_modes,
         );
+        let allowed = self.allowed(estimator, observations, solution);
+        if plan.beyond >= allowed {
+            // Before work that grows with the square of the points.
+            return Err(Unavailable::Unmonitored {
+                probability: plan.beyond,
+                allowed,
+                reason: Unmonitored::Several,
+            });
+        }
+        let projection = Projection::new(&linear).ok_or(Unavailable::Singular)?;
+        let frame = self
+            .frame(&linear, &projection, solution)
+            .ok_or(Unavailable::Singular)?;
         let test = self.settings.false_alert_probability
             / (2.0
                 * f64::from(self.settings.frames)
@@ -141,11 +159,16 @@ impl IntegrityMonitor {
             fault: None,
             found: Separations::new(),
         };
-        self.visit(&units, &plan, &mut search);
+        let alone = Alone {
+            estimator,
+            camera,
+            observations,
+            solution,
+        };
+        self.visit(&units, &plan, &alone, &mut search);
         if let Some((_, fault)) = search.fault {
             return Err(fault);
         }
-        let allowed = self.allowed(estimator, observations, solution);
         let frames = f64::from(self.settings.frames);
         let parts = [
             (plan.beyond, Unmonitored::Several),
@@ -205,7 +228,7 @@ impl IntegrityMonitor {
                     weakest: found.weakest[axis],
                 })
             })
-            .filter(|above| above.level_m > above.limit_m)
+            .filter(|above| above.level_m > above.limit_m || above.level_m.is_nan())
             .max_by(|a, b| (a.level_m / a.limit_m).total_cmp(&(b.level_m / b.limit_m)))
     }
 
@@ -285,13 +308,14 @@ impl IntegrityMonitor {
     }
 
     /// Gives every hypothesis to the search.
-    fn visit(&self, units: &[Unit], plan: &Plan, search: &mut Search) {
+    fn visit(&self, units: &[Unit], plan: &Plan, alone: &Alone, search: &mut Search) {
         let p = self.settings.fault_probability;
         let points = search.frame.linear.ids.len();
         let mut rows: SmallVec<[usize; 16]> = SmallVec::new();
         for (at, unit) in units.iter().enumerate() {
             let remaining = points - unit.rows.len() / 2;
-            search.rows(unit.beacon.into(), p, &unit.rows, remaining);
+            let is_monitored = remaining >= LEAST_REMAINING && alone.fix_one_pose(&unit.rows);
+            search.rows(unit.beacon.into(), p, &unit.rows, is_monitored);
             if !plan.has_pairs {
                 continue;
             }
@@ -300,8 +324,9 @@ impl IntegrityMonitor {
                 rows.extend_from_slice(&unit.rows);
                 rows.extend_from_slice(&other.rows);
                 let remaining = points - rows.len() / 2;
+                let is_monitored = remaining >= LEAST_REMAINING && !alone.are_flat(&rows);
                 let pair = Hypothesis::Pair(unit.beacon, other.beacon);
-                search.rows(pair, p * p, &rows, remaining);
+                search.rows(pair, p * p, &rows, is_monitored);
             }
         }
         let linear = search.frame.linear;
@@ -331,6 +356,58 @@ fn at_point(axes: &Matrix3<f64>, arm: &Vector3<f64>) -> Matrix3x6<f64> {
     by_pose
 }
 
+/// The points of a frame without some of them.
+struct Alone<'a> {
+    estimator: &'a Estimator,
+    camera: &'a Camera,
+    observations: &'a [Observation],
+    solution: &'a Solution,
+}
+
+impl Alone<'_> {
+    /// Returns the used points but those of these rows.
+    fn without<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = &'a Observation> {
+        let used = self.observations.iter();
+        used.filter(|seen| !self.solution.excluded.contains(seen.id))
+            .enumerate()
+            .filter(|(at, _)| !rows.contains(&(2 * at)))
+            .map(|(_, seen)| seen)
+    }
+
+    /// Returns whether the points without these rows have one pose, near the one in use: no second one that they
+    /// allow, where a fault could have led, and an attitude that is known.
+    fn fix_one_pose(&self, rows: &[usize]) -> bool {
+        let others: SmallVec<[Observation; 16]> = self.without(rows).copied().collect();
+        let found = self.estimator.estimate_of_all(self.camera, &others);
+        found.is_ok_and(|found| {
+            let turn = found
+                .camera_from_tanker
+                .rotation
+                .angle_to(&self.solution.camera_from_tanker.rotation);
+            let sigma = found.covariance.largest_attitude_sigma();
+            found.ambiguity <= 0.0 && sigma < MOST_ATTITUDE_SIGMA && turn < MOST_TURN_SIGMAS * sigma
+        })
+    }
+
+    /// Returns whether the points without these rows lie near one plane, so that they allow two poses.
+    fn are_flat(&self, rows: &[usize]) -> bool {
+        let (mut count, mut sum) = (0.0, Vector3::zeros());
+        for seen in self.without(rows) {
+            count += 1.0;
+            sum += seen.marker_in_tanker.coords;
+        }
+        let mean = sum / count;
+        let mut scatter = Matrix3::zeros();
+        for seen in self.without(rows) {
+            let arm = seen.marker_in_tanker.coords - mean;
+            scatter += arm * arm.transpose();
+        }
+        let spread = scatter.symmetric_eigenvalues();
+        let is_deep = spread.min() > FLAT * FLAT * spread.max();
+        !is_deep
+    }
+}
+
 /// What the hypotheses of a frame add up to.
 struct Search<'a> {
     frame: &'a Frame<'a>,
@@ -347,10 +424,9 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn rows(&mut self, hypothesis: Hypothesis, prior: f64, rows: &[usize], remaining: usize) {
+    fn rows(&mut self, hypothesis: Hypothesis, prior: f64, rows: &[usize], is_monitored: bool) {
         let suspicion = &self.frame.suspicion;
-        let is_monitored =
-            remaining >= LEAST_REMAINING && suspicion.without_rows(rows, &mut self.found).is_some();
+        let is_monitored = is_monitored && suspicion.without_rows(rows, &mut self.found).is_some();
         self.take(hypothesis, prior, is_monitored);
     }
 
@@ -372,7 +448,8 @@ impl Search<'_> {
         for (at, (axis, separation)) in self.frame.axes.iter().zip(&self.found).enumerate() {
             let threshold_m = self.quantile * separation.sigma_m;
             let by = separation.difference_m.abs();
-            if by > threshold_m {
+            // Whatever is not a number is no agreement.
+            if by > threshold_m || by.is_nan() || threshold_m.is_nan() {
                 let ratio = by / threshold_m;
                 if self.fault.is_none_or(|(worst, _)| ratio > worst) {
                     let fault = Unavailable::Fault {

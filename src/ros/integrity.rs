@@ -14,6 +14,8 @@ pub struct IntegrityOutput {
     output: Output<Integrity>,
     counts: [u64; IntegrityState::ALL.len()],
     /// Since the last report.
+    frames: u64,
+    /// Since the last report.
     reason: Option<String>,
     log_gate: SaidOnce<IntegrityState>,
 }
@@ -25,6 +27,7 @@ impl IntegrityOutput {
         Self {
             output,
             counts: [0; IntegrityState::ALL.len()],
+            frames: 0,
             reason: None,
             log_gate: SaidOnce::default(),
         }
@@ -45,6 +48,7 @@ impl IntegrityOutput {
         let message = convert::integrity(header.clone(), monitor, levels, mode);
         let state = IntegrityState::from(levels);
         self.counts[usize::from(state.number())] += 1;
+        self.frames += 1;
         if state == IntegrityState::Available {
             if let Some(count) = self.log_gate.good() {
                 log::info!("protection levels are available again after {count} frames");
@@ -60,9 +64,18 @@ impl IntegrityOutput {
         state == IntegrityState::Available
     }
 
+    /// Forgets what was counted.
+    pub(super) fn reset(&mut self) {
+        self.counts = [0; IntegrityState::ALL.len()];
+        self.frames = 0;
+        self.reason = None;
+        self.log_gate = SaidOnce::default();
+    }
+
     /// Returns the counts, and the last reason since the last report.
     pub(super) fn diagnostics(&mut self, node: &str) -> DiagnosticStatus {
         let reason = self.reason.take();
+        let frames = std::mem::take(&mut self.frames);
         let values = IntegrityState::ALL.into_iter().zip(self.counts);
         DiagnosticStatus {
             level: if reason.is_some() {
@@ -71,10 +84,11 @@ impl IntegrityOutput {
                 DiagnosticStatus::OK
             },
             name: format!("{node}: integrity"),
-            message: reason.map_or_else(
-                || "protection levels are available".to_owned(),
-                |reason| format!("not protected: {reason}"),
-            ),
+            message: match reason {
+                Some(reason) => format!("not protected: {reason}"),
+                None if frames == 0 => "no frames".to_owned(),
+                None => "protection levels are available".to_owned(),
+            },
             hardware_id: String::new(),
             values: values
                 .map(|(state, count)| KeyValue {

@@ -68,6 +68,9 @@ impl Outputs {
         configuration: &Configuration,
         setup: Option<RefuellingSetup>,
     ) {
+        if let Some(integrity) = &mut self.integrity {
+            integrity.reset();
+        }
         if let (Some(consumers), Some(setup)) = (&mut self.consumers, setup) {
             consumers.configure(&configuration.consumers, setup);
         }

@@ -154,7 +154,9 @@ fn points(raw: &[RawPoint], source: &str) -> Result<Vec<NamedPoint>, MarkerMapEr
     let mut points: Vec<NamedPoint> = Vec::with_capacity(raw.len());
     for point in raw {
         let name = &point.name.value;
-        let is_named = !name.is_empty() && name.len() <= MOST_NAME_BYTES;
+        // The names of points that no file declares.
+        let is_taken = ["receptacle", "markers_mean"].contains(&name.as_str());
+        let is_named = !is_taken && !name.is_empty() && name.len() <= MOST_NAME_BYTES;
         if !is_named || points.iter().any(|other| other.name == *name) {
             return Err(MarkerMapError::PointName {
                 place: Place::at(source, point.name.referenced),

@@ -18,6 +18,8 @@ from harness.rotations import Array, Pose, skew
 
 # Points that must remain without the suspects.
 LEAST_REMAINING = 4
+# Thickness over length.
+FLAT = 0.02
 # Of the risk, kept for frames in which points were left out.
 SHARE_OF_EXCLUSIONS = 0.1
 
@@ -51,6 +53,12 @@ class Levels:
     unmonitored: float = 0.0
 
 
+def is_flat(points: list[Array]) -> bool:
+    """Whether points lie near one plane."""
+    spread = np.linalg.svd(np.array(points) - np.mean(points, axis=0), compute_uv=False)
+    return bool(spread[2] <= FLAT * spread[0])
+
+
 def levels(
     pose: Pose,
     markers: dict[int, tuple[float, float, float]],
@@ -62,8 +70,12 @@ def levels(
     budget: Budget = Budget(),
     camera: Camera = paper.CAMERA,
     max_outliers: int = 1,
+    without_second_pose: set[int] | None = None,
 ) -> Levels:
-    """The levels of a point of the tanker for a pose that all these points were fitted by."""
+    """The levels of a point of the tanker for a pose that all these points were fitted by.
+
+    `without_second_pose`: the markers without which the others still fix one pose; all unless given.
+    """
     ids = list(markers)
     rows = 2 * len(ids)
     jacobian = np.zeros((rows, 6))
@@ -106,7 +118,13 @@ def levels(
     unmonitorable = 0.0
     for size, prior in ((1, p), (2, p * p)):
         for suspects in combinations(range(n), size):
-            if n - size < LEAST_REMAINING:
+            others = [np.array(markers[i]) for at, i in enumerate(ids) if at not in suspects]
+            is_unclear = (
+                size == 1
+                and without_second_pose is not None
+                and ids[suspects[0]] not in without_second_pose
+            )
+            if n - size < LEAST_REMAINING or is_unclear or (size == 2 and is_flat(others)):
                 unmonitorable += prior
                 continue
             chosen = [row for at in suspects for row in (2 * at, 2 * at + 1)]

@@ -41,6 +41,12 @@ pub enum ConsumersError {
         /// The system's error.
         source: std::io::Error,
     },
+    /// Outputs depend on alert limits that the setup does not state.
+    #[error("parameter \"require_integrity\": {name} has no alert_limit to keep")]
+    NoAlertLimit {
+        /// The file.
+        name: String,
+    },
     /// The setup cannot be used.
     #[error("parameter \"refuelling\": {0}")]
     Setup(#[from] RefuellingSetupError),
@@ -60,7 +66,11 @@ pub fn refuelling_setup(
     let path = PathBuf::from(name);
     let text = crate::text_file::read(&path)
         .map_err(|source| ConsumersError::Unreadable { path, source })?;
-    Ok(Some(RefuellingSetup::from_yaml(&text, name)?))
+    let setup = RefuellingSetup::from_yaml(&text, name)?;
+    if configuration.require_integrity && setup.alert_limit_m.is_none() {
+        return Err(ConsumersError::NoAlertLimit { name: name.clone() });
+    }
+    Ok(Some(setup))
 }
 
 /// Whether protection levels of a frame are available and keep their limits.
