@@ -8,16 +8,18 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3, Vector6};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use tanker_pose::camera::{Pixel, Ray};
 use tanker_pose::estimation::{
-    ErrorBudget, Estimator, EstimatorSettings, Initialisation, Refinement, fixed_point,
-    iterate_accelerated, iterate_literally,
+    Certificate, ErrorBudget, Estimator, EstimatorSettings, Initialisation, Observation,
+    Refinement, fixed_point, iterate_accelerated, iterate_literally,
 };
 use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::{PoseCovariance, optical_from_body};
 use tanker_pose::integrity::{IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount};
 use tanker_pose::refuelling::Region;
-use tanker_pose::simulation::paper_camera;
+use tanker_pose::simulation::{Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::{Marker, MarkerMap};
 use tanker_pose::tracking::{Filter, FilterSettings, LastingError};
 
@@ -143,6 +145,52 @@ fn with_budget(criterion: &mut Criterion) {
             });
         }
     }
+}
+
+/// The proof that no other pose in front of the camera has a lower cost.
+fn certificate(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("estimate_certified");
+    let camera = paper_camera();
+    for (name, seen) in [
+        ("6", frame(&camera, 6)),
+        ("12", frame(&camera, 12)),
+        ("100", frame(&camera, 100)),
+        ("6_flat", flat_frame()),
+    ] {
+        for certify in [false, true] {
+            let estimator = Estimator::new(EstimatorSettings {
+                certify,
+                ..EstimatorSettings::default()
+            });
+            let solution = estimator.estimate(&camera, &seen, None);
+            let certificate = certify.then_some(Certificate::Certified);
+            assert!(solution.is_ok_and(|s| s.certificate == certificate));
+            let id = BenchmarkId::new(if certify { "on" } else { "off" }, name);
+            group.bench_function(id, |bencher| {
+                bencher.iter(|| estimator.estimate(&camera, black_box(&seen), None));
+            });
+        }
+    }
+}
+
+/// Six markers in a plane, 30 m ahead and tilted: behind the camera a minimum costs exactly as little.
+fn flat_frame() -> Vec<Observation> {
+    let places = [
+        (-3.0, -1.0),
+        (-1.0, 1.2),
+        (1.0, -0.8),
+        (3.0, 1.0),
+        (-2.0, 0.2),
+        (2.0, -0.3),
+    ];
+    let marker = |(id, (y, z)): (u32, (f64, f64))| Marker {
+        id,
+        marker_in_tanker: Point3::new(0.0, y, z),
+    };
+    let markers = (1..).zip(places).map(marker).collect();
+    let pose = pose_in_camera(Vector3::new(30.0, 0.0, 3.0), 0.0, 20.0, 10.0);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    Scene::with_markers(paper_camera(), markers, pose).noisy_observations(0.5, &mut random)
 }
 
 /// One detection is 40 px off: all points fail the test, then every subset is tried.
@@ -279,6 +327,7 @@ criterion_group!(
     estimates,
     with_budget,
     integrity,
+    certificate,
     exclusion,
     orthogonal_iteration,
     filter,

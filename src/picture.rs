@@ -188,6 +188,7 @@ mod tests {
             degrees_of_freedom: 6,
             iterations: 5,
             ambiguity: 0.0,
+            certificate: None,
             chi_squared_of_all: 0.0,
             chi_squared_limit: 26.1,
             initialisation: Initialisation::Nominal,

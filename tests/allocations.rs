@@ -40,15 +40,23 @@ fn no_solve_of_64_points_or_fewer_allocates() {
                 Initialisation::Dlt,
                 Initialisation::Global,
             ] {
-                for refinement in [Refinement::MaximumLikelihood, Refinement::None] {
+                for (refinement, certify) in [
+                    (Refinement::MaximumLikelihood, false),
+                    (Refinement::MaximumLikelihood, true),
+                    (Refinement::None, false),
+                    (Refinement::None, true),
+                ] {
                     let mut settings = EstimatorSettings {
                         initialisation,
                         refinement,
                         // Two of six can be left out.
                         min_points: 4,
+                        certify,
                         ..EstimatorSettings::default()
                     };
-                    let case = format!("{count} points, {initialisation:?}, {refinement:?}");
+                    let case = format!(
+                        "{count} points, {initialisation:?}, {refinement:?}, certify {certify}"
+                    );
                     assert_eq!(allocations(settings.clone(), &camera, &clean), 0, "{case}");
                     // The linear start needs six points; of six none can be left out.
                     if initialisation == Initialisation::Dlt && count < 8 {
@@ -72,12 +80,17 @@ fn no_solve_with_a_full_budget_allocates() {
     for camera in [paper_camera(), plumb_bob_camera()] {
         for count in [6, 12, MOST] {
             let clean = frame(&camera, count);
-            let estimator =
-                Estimator::new(EstimatorSettings::default()).with_budget(full_budget(&clean));
-            let solve = || estimator.estimate(&camera, &clean, None);
-            assert!(solve().expect("a pose").is_trusted());
-            let counted = allocation_counter::measure(|| drop(solve()));
-            assert_eq!(counted.count_total, 0, "{count} points");
+            for certify in [false, true] {
+                let settings = EstimatorSettings {
+                    certify,
+                    ..EstimatorSettings::default()
+                };
+                let estimator = Estimator::new(settings).with_budget(full_budget(&clean));
+                let solve = || estimator.estimate(&camera, &clean, None);
+                assert!(solve().expect("a pose").is_trusted());
+                let counted = allocation_counter::measure(|| drop(solve()));
+                assert_eq!(counted.count_total, 0, "{count} points, certify {certify}");
+            }
         }
     }
 }

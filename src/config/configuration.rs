@@ -110,6 +110,8 @@ fn estimator_settings(values: &Values) -> EstimatorSettings {
         max_ambiguity: values.max_ambiguity,
         attitude_sigma_rad: (values.nominal_attitude_sigma_deg > 0.0)
             .then(|| values.nominal_attitude_sigma_deg.to_radians()),
+        certify: values.certify || values.require_certificate,
+        require_certificate: values.require_certificate,
     }
 }
 

@@ -90,6 +90,11 @@ ros2_node::declare_parameters! {
         trust_probability: f64 = double(0.999, [0.5, 0.999_999]);
         /// refuse a pose when the second-best one is at least this likely relative to it; 1: never refuse
         max_ambiguity: f64 = double(0.1, [0.0, 1.0]);
+        /// prove for each pose that no other one in front of the camera has a lower cost, and search for a better one where
+        /// that cannot be proven: certificate in status, see docs/outcomes.md
+        certify: bool = switch(false);
+        /// refuse poses for which there is no such proof; turns certify on
+        require_certificate: bool = switch(false);
         /// multiply the sigmas of detections by the factor by which the scatter of residuals over the last ten seconds
         /// exceeds them, if that is above 1; reported in the fault sigma and in the message of status; see
         /// docs/budget.md

@@ -1,5 +1,6 @@
 //! The estimator: from observations to a pose with the numbers to judge it by.
 
+mod certify;
 mod leave_out;
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion};
@@ -230,6 +231,11 @@ impl Estimator {
         let floored = with_sigma_floor(observations, self.settings.min_points);
         let observations = floored.as_deref().unwrap_or(observations);
         let mut estimate = self.estimate_with_all(camera, observations, expected);
+        if self.settings.certify
+            && let Ok(solution) = &mut estimate
+        {
+            self.certify(camera, observations, expected, solution);
+        }
         let is_final = match &estimate {
             Ok(solution) => solution.is_trusted(),
             // A pixel outside the lens model is an invalid input, not a wrong detection.
@@ -241,6 +247,9 @@ impl Estimator {
                 Found::Solution(mut of_others) => {
                     of_others.chi_squared_of_all =
                         of_all.map_or(f64::INFINITY, |of_all| of_all.chi_squared);
+                    if self.settings.certify {
+                        self.certify(camera, observations, expected, &mut of_others);
+                    }
                     estimate = Ok(of_others);
                 }
                 Found::Unclear(ids) => {
@@ -417,6 +426,7 @@ impl Estimator {
             excluded: Excluded::default(),
             prior: prior_agreement(problem, fit, &self.limits),
             unclear: Excluded::default(),
+            certificate: None,
         })
     }
 }

@@ -19,6 +19,7 @@
 mod ambiguity;
 mod budget;
 mod centred_pose;
+mod certificate;
 mod collinearity;
 mod covariance;
 mod estimator;
@@ -103,6 +104,11 @@ pub struct EstimatorSettings {
     pub max_ambiguity: f64,
     /// Standard deviation of the attitude about the nominal one, each axis, rad; `None`: no prior.
     pub attitude_sigma_rad: Option<f64>,
+    /// Whether to prove for each pose that no other one in front of the camera has a lower quadratic cost, and to search
+    /// for a better one where that cannot be proven: see [`Certificate`].
+    pub certify: bool,
+    /// Whether poses without that proof are refused; needs `certify`.
+    pub require_certificate: bool,
 }
 
 impl Default for EstimatorSettings {
@@ -118,6 +124,8 @@ impl Default for EstimatorSettings {
             trust_probability: 0.999,
             max_ambiguity: 0.1,
             attitude_sigma_rad: None,
+            certify: false,
+            require_certificate: false,
         }
     }
 }
@@ -203,6 +211,47 @@ pub struct Solution {
     pub prior: Option<PriorAgreement>,
     /// Two points of which either may be wrong; empty unless the frame is unclear.
     pub unclear: Excluded,
+    /// Whether the pose is proven to be the best one in front of the camera; `None` unless [`EstimatorSettings::certify`].
+    pub certificate: Option<Certificate>,
+}
+
+/// Whether the minimum of the quadratic cost next to a pose is the lowest one in front of the camera.
+///
+/// The quadratic cost is the one that every start minimises first: squared distances from rays, weighted by the sigmas of
+/// the detections (with [`Refinement::None`] the paper's). The proof says that no pose with the mean of its markers in
+/// front of the camera has a lower one, except by less than 0.01 of chi-squared. It does not cover excluded points, poses
+/// behind the camera, and terms that only the maximum likelihood fit has: an error budget, an attitude prior, and the
+/// lens away from the detections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Certificate {
+    /// Proven.
+    Certified,
+    /// Not proven. A search found no better pose, or only one that is worse by the prior or by maximum likelihood; other
+    /// poses that it found are included in [`Solution::ambiguity`].
+    NotCertified,
+    /// Proven, for a better pose that a search found in place of the one that the start led to.
+    Replaced,
+}
+
+impl Certificate {
+    /// Returns whether there is a proof.
+    #[must_use]
+    pub fn is_proven(self) -> bool {
+        match self {
+            Self::Certified | Self::Replaced => true,
+            Self::NotCertified => false,
+        }
+    }
+
+    /// Returns its name: that of the message's constant, in lower case.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Certified => "certified",
+            Self::NotCertified => "not_certified",
+            Self::Replaced => "replaced",
+        }
+    }
 }
 
 impl Solution {
@@ -218,6 +267,14 @@ impl Solution {
         let left_out = u16::try_from(self.excluded.ids().count()).unwrap_or(0);
         let degrees_of_freedom = self.degrees_of_freedom.saturating_add(2 * left_out);
         (self.chi_squared_of_all, degrees_of_freedom)
+    }
+
+    /// Returns by how much the chi-squared of the second-best pose exceeds that of this one, by
+    /// [`Self::ambiguity`]; `None` where none was found, or its likelihood is negligible.
+    #[must_use]
+    pub fn runner_up_gap(&self) -> Option<f64> {
+        // Not −2 ln(1), which is minus zero.
+        (self.ambiguity > 0.0).then(|| 2.0 * self.ambiguity.recip().ln())
     }
 
     /// Returns whether the residuals are as small as the sigmas promise, and image and prior agree.

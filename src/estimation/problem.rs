@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, Rotation3};
 
 use super::budget::{AttitudePrior, FrameBudget, InDoubt};
 use super::centred_pose::CentredPose;
+use super::certificate;
 use super::collinearity::{CollinearityCost, CollinearityMoments, Weighting};
 use super::covariance::sandwich;
 use super::lanes::four::{Arithmetic, Kernel, Plain, vectorised};
@@ -20,6 +21,14 @@ const FIXED_POINT_TOLERANCE: f64 = 1e-7;
 /// Chi-squared above that of the chosen pose at which a rival is negligible: its likelihood is below 1e-13 of the
 /// chosen one's.
 pub(crate) const NEGLIGIBLE: f64 = 60.0;
+
+/// Chi-squared by which another pose may be better in spite of a certificate.
+const UNNOTICED: f64 = 0.01;
+/// rad²; the same for the paper's cost, which is not weighted by sigmas: a sum of squared angles to the rays.
+const UNNOTICED_ANGLE: f64 = 1e-11;
+/// Frobenius norm of the difference of rotation matrices, 20°. A minimum farther from a pose belongs to another pose:
+/// between maximum likelihood and the cost it moves by a fraction of the attitude's sigma, which the node limits to 10°.
+const OWN_MINIMUM: f64 = 0.5;
 
 /// Share of the predicted decrease of chi-squared used as a lower bound of a fit. Far from a minimum a step predicts
 /// too much or too little; a quarter proved too large for the descent of the cost.
@@ -124,6 +133,28 @@ impl<'a> Problem<'a> {
             cost,
             doubts: None,
         })
+    }
+
+    /// Returns whether it is proven that no pose with the markers' mean in front of the camera has a lower quadratic cost
+    /// than the minimum next to a rotation.
+    pub(crate) fn is_best_in_front(&self, rotation: &Rotation3<f64>) -> bool {
+        let minimum = newton::minimise(self.cost, rotation, FIXED_POINT_TOLERANCE);
+        let turn = minimum.rotation.matrix() - rotation.matrix();
+        if !minimum.converged || turn.norm() > OWN_MINIMUM {
+            return false;
+        }
+        let tolerance = self.unnoticed(self.cost.centre_in_camera(&minimum.rotation).z);
+        certificate::is_best_in_front(self.cost, &minimum.rotation, tolerance)
+    }
+
+    /// Returns by how much the cost of another pose may be lower in spite of a certificate, for a depth of the markers'
+    /// mean, m.
+    pub(crate) fn unnoticed(&self, depth: f64) -> f64 {
+        let unnoticed = match self.refinement {
+            Refinement::MaximumLikelihood => UNNOTICED,
+            Refinement::None => UNNOTICED_ANGLE,
+        };
+        unnoticed * depth * depth
     }
 
     /// Returns the problem with a budget that has been filled for its points.

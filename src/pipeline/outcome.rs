@@ -4,8 +4,8 @@ use super::residuals::{MarkerResidual, residuals};
 use super::{FrameTrack, LeftOut, OutcomeCode, Refusal};
 use crate::camera::Camera;
 use crate::estimation::{
-    EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation, PriorAgreement,
-    Solution,
+    Certificate, EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation,
+    PriorAgreement, Solution,
 };
 use crate::integrity::{FrameIntegrity, Unavailable};
 
@@ -182,6 +182,10 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings, is_reported: bool) -
             ambiguity: solution.ambiguity,
             limit: settings.max_ambiguity,
         });
+    }
+    let is_proven = solution.certificate.is_some_and(Certificate::is_proven);
+    if settings.require_certificate && !is_proven {
+        return Some(Refusal::NotCertified);
     }
     let sigma_deg = solution.covariance.largest_attitude_sigma().to_degrees();
     (sigma_deg > MAX_ATTITUDE_SIGMA_DEG).then_some(Refusal::TooUncertain {

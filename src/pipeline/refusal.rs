@@ -174,6 +174,11 @@ pub enum Refusal {
         /// The largest that is accepted.
         limit: f64,
     },
+    /// Another pose may fit better.
+    #[error(
+        "expected proof that no other pose in front of the camera fits better, but found none (require_certificate)"
+    )]
+    NotCertified,
 }
 
 impl Refusal {
@@ -200,7 +205,7 @@ impl Refusal {
             Self::NotTrusted { .. } | Self::ContradictsPrior { .. } | Self::SuspectMarker(_) => {
                 OutcomeCode::NotTrusted
             }
-            Self::Ambiguous { .. } => OutcomeCode::Ambiguous,
+            Self::Ambiguous { .. } | Self::NotCertified => OutcomeCode::Ambiguous,
         }
     }
     /// Returns whether it concerns the header, or a missing camera.

@@ -51,6 +51,12 @@ pub struct EstimatorOptions {
     /// Refuse a frame when a second pose is at least this likely; 1: never
     #[arg(long, value_name = "RATIO", default_value_t = KEYS.max_ambiguity.default(), value_parser = double(KEYS.max_ambiguity))]
     max_ambiguity: f64,
+    /// Prove for each pose that no other one in front of the camera has a lower cost, and search where that cannot be proven
+    #[arg(long)]
+    certify: bool,
+    /// Refuse poses for which there is no such proof
+    #[arg(long)]
+    require_certificate: bool,
     /// Roll of the tanker relative to the receiver in the nominal attitude, degrees
     #[arg(long, value_name = "DEG", default_value_t = KEYS.nominal_roll_deg.default(), value_parser = double(KEYS.nominal_roll_deg))]
     nominal_roll_deg: f64,
@@ -116,6 +122,8 @@ impl EstimatorOptions {
             max_ambiguity: self.max_ambiguity,
             attitude_sigma_rad: (self.nominal_attitude_sigma_deg > 0.0)
                 .then(|| self.nominal_attitude_sigma_deg.to_radians()),
+            certify: self.certify || self.require_certificate,
+            require_certificate: self.require_certificate,
         }
     }
 

@@ -150,6 +150,19 @@ impl CollinearityCost {
         Vector3::new(centre[0], centre[1], centre[2])
     }
 
+    /// Returns the columns of `Ω`.
+    #[inline(always)]
+    pub(crate) fn omega(&self) -> [[f64; 9]; 9] {
+        self.omega
+            .map(|[a, b, c]| [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]])
+    }
+
+    /// Returns what the depth of the markers' mean is in the nine entries of a rotation, m.
+    #[inline(always)]
+    pub(crate) fn depth_from_rotation(&self) -> [f64; 9] {
+        self.centre_from_rotation.map(|column| column[2])
+    }
+
     /// Returns the form's coefficients, in the order of [`products`].
     pub(crate) fn coefficients(&self) -> [f64; PRODUCTS] {
         let mut coefficients = [0.0; PRODUCTS];

@@ -11,7 +11,7 @@ use crate::estimation::problem::{Problem, Room};
 use crate::estimation::{Expected, Initialisation, Observation, Refinement, Solution};
 
 /// rad; a subset whose pose is turned farther from its prior than this fits noise.
-const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
+pub(super) const MAX_TURN_FROM_PRIOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
 impl Estimator {
     /// Searches for the smallest set of points whose exclusion makes the rest pass the test.

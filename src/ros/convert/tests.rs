@@ -26,6 +26,7 @@ fn solution() -> Solution {
         degrees_of_freedom: 8,
         iterations: 5,
         ambiguity: 0.25,
+        certificate: None,
         chi_squared_of_all: 0.0,
         chi_squared_limit: 26.1,
         initialisation: Initialisation::Dlt,
