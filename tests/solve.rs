@@ -385,3 +385,24 @@ flex:
     let dominant = with_budget[0]["dominant_cause"].as_str().expect("a name");
     assert!(dominant.starts_with("principal_point"), "{dominant}");
 }
+
+#[test]
+fn certificate_is_told_only_where_it_is_asked_for() {
+    let points: Vec<Value> = tanker_pose::simulation::paper_scene()
+        .exact_observations()
+        .iter()
+        .map(|seen| json!({"id": seen.id, "u": seen.pixel.u, "v": seen.pixel.v}))
+        .collect();
+    let line = json!({"id": 1, "camera": camera(), "points": points}).to_string();
+    let plain = solve(&["--marker-map", "paper"], vec![line.clone()]);
+    assert!(plain[0].get("certificate").is_none());
+    assert!(plain[0].get("runner_up_gap").is_none());
+    for option in ["--certify", "--require-certificate"] {
+        let answers = solve(&["--marker-map", "paper", option], vec![line.clone()]);
+        assert_eq!(answers[0]["outcome"], "ok");
+        assert_eq!(answers[0]["certificate"], "certified");
+        // The mirrored tanker fits far worse.
+        assert!(answers[0]["runner_up_gap"].is_null());
+        assert_eq!(answers[0]["covariance"], plain[0]["covariance"]);
+    }
+}

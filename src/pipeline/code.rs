@@ -70,7 +70,7 @@ status_codes! {
     BehindCamera = 13 "BEHIND_CAMERA",
     /// The residuals are too large for the stated sigmas.
     NotTrusted = 14 "NOT_TRUSTED",
-    /// A second pose fits almost as well.
+    /// A second pose fits almost as well, or a required certificate is missing.
     Ambiguous = 15 "AMBIGUOUS",
 }
 
@@ -144,7 +144,9 @@ mod tests {
     #[test]
     fn codes_are_those_of_the_message_definition() {
         let outcomes = constants(STATUS).filter(|(name, _)| {
-            !name.starts_with("INITIALISATION_") && !name.starts_with("TRACK_")
+            !["INITIALISATION_", "TRACK_", "CERTIFICATE_"]
+                .iter()
+                .any(|prefix| name.starts_with(prefix))
         });
         assert!(outcomes.eq(OutcomeCode::ALL.map(|code| (code.name(), code.number()))));
         let tracks = constants(STATUS)

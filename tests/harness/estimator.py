@@ -25,7 +25,7 @@ _PROBE_PERIOD_S = 0.05
 OUTCOMES: dict[int, str] = {
     value: name
     for name, value in type(EstimatorStatus).__prepare__("EstimatorStatus", ()).items()
-    if not name.startswith(("INITIALISATION_", "TRACK_"))
+    if not name.startswith(("INITIALISATION_", "TRACK_", "CERTIFICATE_"))
 }
 
 

@@ -14,7 +14,7 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3};
 
 use super::messages::{self, EstimatorStatus, Header, Time};
 use crate::camera;
-use crate::estimation::{FrameCauses, Initialisation, Solution};
+use crate::estimation::{Certificate, FrameCauses, Initialisation, Solution};
 use crate::geometry::{Motion, PoseCovariance};
 use crate::pipeline::{Detection, FrameOutcome, Stamp};
 
@@ -215,6 +215,16 @@ pub fn status(
             .as_ref()
             .and_then(FrameCauses::dominant)
             .map_or_else(String::new, |cause| cause.name.clone()),
+        certificate: certificate(solution.and_then(|solution| solution.certificate)),
+    }
+}
+
+const fn certificate(of_pose: Option<Certificate>) -> u8 {
+    match of_pose {
+        None => EstimatorStatus::CERTIFICATE_NONE,
+        Some(Certificate::Certified) => EstimatorStatus::CERTIFICATE_CERTIFIED,
+        Some(Certificate::NotCertified) => EstimatorStatus::CERTIFICATE_NOT_CERTIFIED,
+        Some(Certificate::Replaced) => EstimatorStatus::CERTIFICATE_REPLACED,
     }
 }
 

@@ -136,6 +136,41 @@ fn estimate_gives_ok_without_a_message() {
 }
 
 #[test]
+fn certificate_of_a_solution_is_told_whether_or_not_it_is_refused() {
+    let told = |certificate, is_refused: bool| {
+        let solution = Solution {
+            certificate,
+            ..solution()
+        };
+        let frame = if is_refused {
+            frame(Err(Refusal::NotCertified), Some(solution))
+        } else {
+            frame(Ok(solution), None)
+        };
+        status(header(), &frame, &[], Duration::ZERO).certificate
+    };
+    for is_refused in [false, true] {
+        for (certificate, number) in [
+            (None, EstimatorStatus::CERTIFICATE_NONE),
+            (
+                Some(Certificate::Certified),
+                EstimatorStatus::CERTIFICATE_CERTIFIED,
+            ),
+            (
+                Some(Certificate::NotCertified),
+                EstimatorStatus::CERTIFICATE_NOT_CERTIFIED,
+            ),
+            (
+                Some(Certificate::Replaced),
+                EstimatorStatus::CERTIFICATE_REPLACED,
+            ),
+        ] {
+            assert_eq!(told(certificate, is_refused), number);
+        }
+    }
+}
+
+#[test]
 fn refusal_without_a_solution_has_nan_and_a_message() {
     let status = status(
         header(),

@@ -39,6 +39,8 @@ pub struct EstimatorStatus {
     pub mode_amplitudes: Vec<f64>,
     /// The cause with the largest share of the position's variance; empty as above.
     pub dominant_cause: String,
+    /// One of the `CERTIFICATE` constants of this type.
+    pub certificate: u8,
 }
 
 impl EstimatorStatus {
@@ -52,6 +54,15 @@ impl EstimatorStatus {
     pub const INITIALISATION_PREVIOUS: u8 = 3;
     /// Search over all attitudes.
     pub const INITIALISATION_GLOBAL: u8 = 4;
+
+    /// No proof was asked for, or there is no solution.
+    pub const CERTIFICATE_NONE: u8 = 0;
+    /// No pose in front of the camera has a lower cost.
+    pub const CERTIFICATE_CERTIFIED: u8 = 1;
+    /// Not proven.
+    pub const CERTIFICATE_NOT_CERTIFIED: u8 = 2;
+    /// Proven for a better pose than that of the start.
+    pub const CERTIFICATE_REPLACED: u8 = 3;
 }
 
 #[cfg(test)]
@@ -70,13 +81,27 @@ mod tests {
         STATUS_MSG.lines().filter_map(declaration).collect()
     }
 
+    fn numbers(prefix: &str) -> Vec<u8> {
+        constants()
+            .into_iter()
+            .filter(|(name, _)| name.starts_with(prefix))
+            .map(|(_, value)| value)
+            .collect()
+    }
+
+    #[test]
+    fn certificates_are_the_constants_of_the_msg_file() {
+        let here = [
+            EstimatorStatus::CERTIFICATE_NONE,
+            EstimatorStatus::CERTIFICATE_CERTIFIED,
+            EstimatorStatus::CERTIFICATE_NOT_CERTIFIED,
+            EstimatorStatus::CERTIFICATE_REPLACED,
+        ];
+        assert_eq!(numbers("CERTIFICATE"), here);
+    }
+
     #[test]
     fn initialisations_are_the_constants_of_the_msg_file() {
-        let in_file: Vec<u8> = constants()
-            .into_iter()
-            .filter(|(name, _)| name.starts_with("INITIALISATION"))
-            .map(|(_, value)| value)
-            .collect();
         let here = [
             EstimatorStatus::INITIALISATION_NONE,
             EstimatorStatus::INITIALISATION_NOMINAL,
@@ -84,6 +109,6 @@ mod tests {
             EstimatorStatus::INITIALISATION_PREVIOUS,
             EstimatorStatus::INITIALISATION_GLOBAL,
         ];
-        assert_eq!(in_file, here);
+        assert_eq!(numbers("INITIALISATION"), here);
     }
 }

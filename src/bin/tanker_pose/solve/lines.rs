@@ -129,6 +129,16 @@ pub struct OutputNumbers {
     degrees_of_freedom: u16,
     ambiguity: f64,
     iterations: u16,
+    #[serde(flatten)]
+    certificate: Option<OutputCertificate>,
+}
+
+/// Only where a proof was asked for.
+#[derive(Debug, Serialize)]
+pub struct OutputCertificate {
+    certificate: &'static str,
+    /// Chi-squared of the second-best pose less that of this one; null where there is none that counts.
+    runner_up_gap: Option<f64>,
 }
 
 /// Returns why a line is not a frame, if its beginning shows it: the parser's message would be about its own structures.
@@ -265,6 +275,10 @@ impl OutputNumbers {
             degrees_of_freedom: solution.degrees_of_freedom,
             ambiguity: solution.ambiguity,
             iterations: solution.iterations,
+            certificate: solution.certificate.map(|certificate| OutputCertificate {
+                certificate: certificate.name(),
+                runner_up_gap: solution.runner_up_gap(),
+            }),
         }
     }
 }

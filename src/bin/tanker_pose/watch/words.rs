@@ -95,10 +95,11 @@ impl Scene<'_> {
     pub fn fit(&self) -> Option<String> {
         let status = self.heard.status(self.now)?;
         Some(format!(
-            "chi2/dof {}, rms {} px, ambiguity {}",
+            "chi2/dof {}, rms {} px, ambiguity {}{}",
             chi_squared_per_degree(status),
             number(status.rms_residual),
-            number(status.ambiguity)
+            number(status.ambiguity),
+            certificate(status)
         ))
     }
 
@@ -222,6 +223,16 @@ pub fn plain(text: &str) -> String {
         shown.push('…');
     }
     shown
+}
+
+/// Returns what is known of other minima; nothing where no proof was asked for.
+fn certificate(status: &EstimatorStatus) -> &'static str {
+    match status.certificate {
+        EstimatorStatus::CERTIFICATE_CERTIFIED => ", certified",
+        EstimatorStatus::CERTIFICATE_NOT_CERTIFIED => ", not certified",
+        EstimatorStatus::CERTIFICATE_REPLACED => ", certified, false start replaced",
+        _ => "",
+    }
 }
 
 #[cfg(test)]
