@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! bin, ros            the only layers with files, clocks, threads and ros2-client
+//! convert, messages   plain types <-> the messages of ROS
 //! simulation          seeded approaches and synthetic detections, for tools and tests
 //! picture             the geometry of a frame in space, for display
 //! pipeline, config    the processing of one frame; raw parameters -> checked settings
@@ -20,12 +21,16 @@
 //! aircraft) and `camera` (always the optical frame: x right, y down, z ahead). SI units and radians
 //! throughout; a suffix names anything else (`_px`, `_deg`).
 
+#[cfg(feature = "ros")]
+pub mod answering;
 pub mod camera;
 pub mod config;
+pub mod convert;
 pub mod estimation;
 pub mod frames;
 pub mod geometry;
 pub mod integrity;
+pub mod messages;
 pub mod picture;
 pub mod pipeline;
 pub mod refuelling;

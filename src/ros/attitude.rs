@@ -7,18 +7,11 @@ use futures::stream::{self, FusedStream};
 use ros2_client::{ReadError, Subscription};
 
 use super::messages::{Imu, VehicleAttitude};
+use super::output::endpoint;
 use super::participant::{EndpointError, RosNode};
-use super::topics::{self, Topic};
+use super::topics;
+use crate::answering::attitudes::AttitudeMessage;
 use crate::config::AttitudeSource;
-
-/// One sample, as a flight stack sends it.
-#[derive(Debug)]
-pub enum AttitudeMessage {
-    /// `px4_msgs/VehicleAttitude`.
-    Px4(VehicleAttitude),
-    /// `sensor_msgs/Imu`.
-    Imu(Box<Imu>),
-}
 
 /// The topic, if there is one.
 pub enum AttitudeSubscription {
@@ -43,7 +36,7 @@ impl AttitudeSubscription {
         if !is_wanted {
             return Ok(Self::None);
         }
-        let Topic { name, qos, .. } = topics::TANKER_ATTITUDE;
+        let (name, qos) = endpoint(&topics::TANKER_ATTITUDE);
         Ok(Self::Imu(ros.subscription(name, &qos)?))
     }
 
@@ -55,7 +48,7 @@ impl AttitudeSubscription {
         let Some(source) = source else {
             return Ok(Self::None);
         };
-        let Topic { name, qos, .. } = source.topic();
+        let (name, qos) = endpoint(&source.topic());
         Ok(match source {
             AttitudeSource::Px4 => Self::Px4(ros.subscription(name, &qos)?),
             AttitudeSource::Imu => Self::Imu(ros.subscription(name, &qos)?),

@@ -3,6 +3,7 @@
 use super::attitude::AttitudeSubscription;
 use super::input::InputSubscription;
 use super::messages::CameraInfo;
+use super::output::endpoint;
 use super::participant::{EndpointError, RosNode, Subscription};
 use super::topics::{self, Topic};
 use crate::config::Configuration;
@@ -36,7 +37,10 @@ impl Inputs {
         let detections = configuration.input.topic();
         let attitude = configuration.consumers.attitude;
         let tanker_attitude = topics::TANKER_ATTITUDE;
-        let depth = |topic: &Topic| ros.subscription_depth(topic.name, &topic.qos);
+        let depth = |topic: &Topic| {
+            let (name, qos) = endpoint(topic);
+            ros.subscription_depth(name, &qos)
+        };
         let depths = Depths {
             detections: depth(&detections)?,
             camera_info: depth(&camera_info)?,
@@ -44,7 +48,10 @@ impl Inputs {
             tanker_attitude: depth(&tanker_attitude)?,
         };
         Ok(Self {
-            camera_info: ros.subscription(camera_info.name, &camera_info.qos)?,
+            camera_info: {
+                let (name, qos) = endpoint(&camera_info);
+                ros.subscription(name, &qos)?
+            },
             attitude: AttitudeSubscription::open(ros, attitude)?,
             tanker_attitude: AttitudeSubscription::open_tanker(
                 ros,

@@ -13,20 +13,18 @@ use super::arguments::Arguments;
 use super::clock::NodeClock;
 use super::environment::Environment;
 pub use super::error::NodeError;
-use super::files::Files;
 use super::logging;
 use super::names::NodeNames;
 use super::parameters::{ParameterServices, SharedParameters};
 use super::participant::RosNode;
-use super::qos_overrides::QosOverrides;
 use super::reset::ResetService;
 use super::serve::Server;
-use super::start_values::{StartValues, start_values};
+use super::start_values::StartValues;
 use super::topics;
-use crate::config::{self, Configuration, Parameters, TABLE};
-
-/// What the node is called unless it is remapped.
-pub const NODE_NAME: &str = "tanker_pose";
+use crate::answering::files::Files;
+use crate::answering::start;
+pub use crate::answering::start::NODE_NAME;
+use crate::config::{self, Configuration};
 
 /// Runs the node until SIGINT or SIGTERM, and leaves the graph; starts logging.
 ///
@@ -110,13 +108,5 @@ pub fn run_until(
 /// # Errors
 /// [`NodeError`] of a name, a file or a value.
 pub fn effective_parameters(arguments: &Arguments) -> Result<(NodeNames, StartValues), NodeError> {
-    let names = NodeNames::new(NODE_NAME, &arguments.remaps)?;
-    let qos = QosOverrides::new(topics::endpoints(&names)?);
-    let start = start_values(
-        arguments,
-        &names.fully_qualified(),
-        Parameters::new(TABLE),
-        qos,
-    )?;
-    Ok((names, start))
+    Ok(start::effective_parameters(arguments)?)
 }

@@ -1,52 +1,39 @@
-//! One topic that the node publishes on.
+//! The node's topics in the graph: publishers for its outputs, quality of service for both ends.
 
 use ros2_client::{Publisher, WriteError};
 
-use super::diagnostics::Tally;
 use super::messages::Message;
-use super::participant::{EndpointError, RosNode};
-use super::topics::Topic;
-use crate::config::Configuration;
+use super::participant::{EndpointError, QosProfile, RosNode, reliable, sensor_data};
+use super::qos_overrides::Role;
+use crate::answering::output::{Output, Sink, Sinks};
+use crate::answering::topics::Topic;
 
-/// A topic that never makes the node wait: what a slow subscriber has no room for is dropped and
-/// counted.
-pub struct Output<M: Message> {
-    publisher: Publisher<M>,
-    topic: String,
+/// Returns a topic's name before remaps, and the quality of service of the node's end unless it is overridden.
+pub(super) fn endpoint(topic: &Topic) -> (&'static str, QosProfile) {
+    let qos = match topic.role {
+        Role::Subscription => sensor_data(topic.depth),
+        Role::Publisher => reliable(topic.depth),
+    };
+    (topic.name, qos)
 }
 
-impl<M: Message> Output<M> {
-    /// Returns the output to a topic, opened.
-    ///
-    /// # Errors
-    /// [`EndpointError`] when the name is malformed or the middleware refuses.
-    pub fn open(ros: &mut RosNode, topic: &Topic) -> Result<Self, EndpointError> {
-        Ok(Self {
-            publisher: ros.publisher(topic.name, &topic.qos)?,
-            topic: ros.names().topic(topic.name)?,
+struct Published<M: Message>(Publisher<M>);
+
+impl<M: Message> Sink<M> for Published<M> {
+    fn put(&mut self, message: M) -> Result<(), String> {
+        self.0.publish(message).map_err(|error| match error {
+            WriteError::WouldBlock { .. } => "a subscriber does not keep up".to_owned(),
+            other => other.to_string(),
         })
     }
+}
 
-    /// Returns the output to a topic if the configuration opens that.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub fn open_if_wanted(
-        ros: &mut RosNode,
-        topic: &Topic,
-        configuration: &Configuration,
-    ) -> Result<Option<Self>, EndpointError> {
-        let is_open = topic.is_open(configuration);
-        is_open.then(|| Self::open(ros, topic)).transpose()
-    }
+impl Sinks for RosNode {
+    type Error = EndpointError;
 
-    pub(super) fn publish(&mut self, message: M, tally: &mut Tally) {
-        if let Err(error) = self.publisher.publish(message) {
-            let reason = match error {
-                WriteError::WouldBlock { .. } => "a subscriber does not keep up".to_owned(),
-                other => other.to_string(),
-            };
-            tally.drop_one(&self.topic, reason);
-        }
+    fn open<M: Message>(&mut self, topic: &Topic) -> Result<Output<M>, EndpointError> {
+        let (name, qos) = endpoint(topic);
+        let publisher = Published(self.publisher(name, &qos)?);
+        Ok(Output::new(self.names().topic(name)?, Box::new(publisher)))
     }
 }

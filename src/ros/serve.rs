@@ -1,30 +1,27 @@
 //! The node's loop: messages to their handler, changed parameters, and, if the node is managed, its transitions.
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use futures::{FutureExt, StreamExt, pin_mut, select_biased};
 
-use super::attitudes::Attitudes;
-use super::clock::{NodeClock, SimTime};
+use super::clock::NodeClock;
 use super::environment::Environment;
 use super::error::NodeError;
-use super::files::Files;
-use super::handler::Handler;
-use super::health::Watch;
-use super::input::InputReader;
 use super::inputs::Inputs;
 use super::lifecycle::{Lifecycle, Request, State, WorkResult};
-use super::monitor::Monitor;
-use super::names::NamesError;
 use super::newest::Newest;
-use super::outputs::Outputs;
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
-use super::topics::{self, ATTITUDE};
+use super::sim_time::SimTime;
+use super::topics;
+use crate::answering::clock::Clock;
+use crate::answering::files::Files;
+use crate::answering::handler::Handler;
+use crate::answering::outputs::Outputs;
+use crate::answering::topics::ATTITUDE;
 use crate::camera::CalibrationBudget;
 use crate::config::Configuration;
-use crate::pipeline::{Pipeline, budget_in_words};
+use crate::pipeline::budget_in_words;
 use crate::target::MarkerMap;
 use crate::text;
 
@@ -193,7 +190,7 @@ impl<'a> Server<'a> {
                         let count = lost.take();
                         self.with(|handler| handler.on_lost(topic, count));
                     }
-                    self.with(|handler| handler.on_second(publishers, &graph, Instant::now()));
+                    self.with(|handler| handler.on_second(publishers, &graph));
                 },
                 sample = detections.select_next_some() => self.with(|handler| match sample {
                     Ok(message) => handler.on_detections(message),
@@ -281,7 +278,9 @@ impl<'a> Server<'a> {
             }
         };
         self.introduce(configuration, &files.map, files.calibration.as_ref());
-        let mut handler = self.handler(configuration, files, outputs)?;
+        let clock = Clock::live(self.clock.clone());
+        let names = self.ros.names();
+        let mut handler = Handler::new(configuration, files, outputs, names, &clock)?;
         handler.understand(configuration);
         self.work = Work::Ready(Box::new(handler));
         Ok(())
@@ -304,33 +303,6 @@ impl<'a> Server<'a> {
         log::info!("{}", topics::introduction(names, configuration));
         let sigmas = &configuration.settings.calibration;
         log::info!("{}", budget_in_words(map.budget(), sigmas, calibration));
-    }
-
-    /// Returns what handles the messages, for this configuration and its files.
-    fn handler(
-        &self,
-        configuration: &Configuration,
-        files: Files,
-        outputs: Outputs,
-    ) -> Result<Handler, NamesError> {
-        let map = Arc::new(files.map);
-        let reader = InputReader {
-            input: configuration.input,
-            map: Arc::clone(&map),
-            max_hamming: configuration.max_hamming,
-        };
-        let pipeline = Pipeline::new(configuration.settings.clone(), map)
-            .with_calibration_budget(files.calibration)
-            .with_refuelling(files.setup);
-        let names = self.ros.names();
-        let watch = Watch::new(
-            names.topic(configuration.input.topic().name)?,
-            names.topic(CAMERA_INFO)?,
-            Instant::now(),
-        );
-        let monitor = Monitor::new(names.base_name(), self.clock.clone(), watch);
-        let attitudes = Attitudes::new(configuration);
-        Ok(Handler::new(pipeline, reader, attitudes, outputs, monitor))
     }
 
     fn activate(&mut self, on: bool) {

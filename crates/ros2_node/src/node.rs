@@ -33,7 +33,7 @@ use ros2_client::{NodeOptions, QosProfile};
 use smol::channel::Receiver;
 
 use crate::arguments::Arguments;
-use crate::clock::{NodeClock, SimTime};
+use crate::clock::NodeClock;
 use crate::environment::Environment;
 use crate::lifecycle::{Lifecycle, Request, State, WorkResult};
 use crate::logging;
@@ -44,6 +44,7 @@ use crate::parameters::{
 pub use crate::participant::MiddlewareGone;
 use crate::participant::{EndpointError, OpenError, RosNode};
 use crate::qos_overrides::{Endpoint, QosOverrides, Role};
+use crate::sim_time::SimTime;
 use crate::start_values::{StartParameterError, start_values};
 
 /// How often a node looks whether its middleware still runs.

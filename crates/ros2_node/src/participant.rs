@@ -25,8 +25,9 @@ use ros2_client::{Context, CreateError, CreateResult, MessageTypeName, Node, Nod
 pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
 
 use super::arguments::Arguments;
+use super::discovered::{OwnEnd, graph_of, type_on_the_wire};
 use super::environment::Environment;
-use super::graph::{Graph, OwnEnd, type_on_the_wire};
+use super::graph::Graph;
 use super::leave::Farewell;
 use super::messages::Message;
 use super::names::{NamesError, NodeNames};
@@ -268,7 +269,7 @@ impl RosNode {
     /// Returns how the other ends of the topics opened so far fit.
     #[must_use]
     pub fn graph(&self) -> Graph {
-        Graph::of(&self.context.domain_participant(), &self.own_ends)
+        graph_of(&self.context.domain_participant(), &self.own_ends)
     }
 
     /// Returns what the domain holds beside this node, and the nodes in it that publish `M`.

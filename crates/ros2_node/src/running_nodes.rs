@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ros2_client::dds::rustdds::DomainParticipant;
 
-use super::graph::type_on_the_wire;
+use super::discovered::type_on_the_wire;
 use super::messages::Message;
 
 /// Every ROS node that has parameters answers this service, whose name begins with the node's.

@@ -187,7 +187,7 @@ impl StartValues {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "client"))]
 mod tests {
     use super::super::participant::reliable;
     use super::super::qos_overrides::{Endpoint, Role};

@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-use ros2_client::qos::{Durability, History, Reliability, WhenFull};
-
+use super::policies::Policies;
 use crate::parameters::{Kind, ParameterValue};
-use crate::participant::QosProfile;
 
 /// What the names of all these parameters begin with.
 pub const PREFIX: &str = "qos_overrides.";
@@ -103,24 +101,17 @@ impl Policy {
 pub struct Endpoint {
     pub(super) topic: String,
     pub(super) role: Role,
-    pub(super) qos: QosProfile,
-    // Survives a history that does not need it.
-    depth: i64,
+    pub(super) policies: Policies,
 }
 
 impl Endpoint {
     /// Returns the end of the topic with this absolute name, and what holds unless it is overridden.
     #[must_use]
-    pub fn new(topic: String, role: Role, qos: &QosProfile) -> Self {
-        let depth = match qos.history {
-            History::KeepLast { depth } => i64::try_from(depth).unwrap_or(DEEPEST),
-            History::KeepAll => 1,
-        };
+    pub fn new(topic: String, role: Role, policies: impl Into<Policies>) -> Self {
         Self {
             topic,
             role,
-            qos: qos.clone(),
-            depth,
+            policies: policies.into(),
         }
     }
 
@@ -135,21 +126,14 @@ impl Endpoint {
 
     pub(super) fn get(&self, policy: Policy) -> ParameterValue {
         let text = |text: &str| ParameterValue::String(text.to_owned());
+        let either = |on: bool, yes: &str, no: &str| text(if on { yes } else { no });
+        let of = &self.policies;
         match policy {
-            Policy::Reliability => text(match self.qos.reliability {
-                Reliability::BestEffort => "best_effort",
-                Reliability::Reliable { .. } => "reliable",
-            }),
-            Policy::Durability => text(match self.qos.durability {
-                Durability::Volatile => "volatile",
-                Durability::TransientLocal => "transient_local",
-            }),
-            Policy::History => text(match self.qos.history {
-                History::KeepLast { .. } => "keep_last",
-                History::KeepAll => "keep_all",
-            }),
-            Policy::Depth => ParameterValue::Integer(self.depth),
-            Policy::Deadline => ParameterValue::Integer(self.qos.deadline.map_or(0, |deadline| {
+            Policy::Reliability => either(of.reliable, "reliable", "best_effort"),
+            Policy::Durability => either(of.transient_local, "transient_local", "volatile"),
+            Policy::History => either(of.keep_all, "keep_all", "keep_last"),
+            Policy::Depth => ParameterValue::Integer(i64::try_from(of.depth).unwrap_or(DEEPEST)),
+            Policy::Deadline => ParameterValue::Integer(of.deadline.map_or(0, |deadline| {
                 i64::try_from(deadline.as_nanos()).unwrap_or(LONGEST_NS)
             })),
         }
@@ -169,49 +153,23 @@ impl Endpoint {
         if !allowed {
             return false;
         }
+        let of = &mut self.policies;
         match (policy, value) {
             (_, ParameterValue::String(word)) if word == SYSTEM_DEFAULT => {}
-            (Policy::Reliability, ParameterValue::String(word)) => {
-                // A full window never makes the node wait.
-                let when_full = WhenFull::Fail;
-                self.qos.reliability = if word == "reliable" {
-                    Reliability::Reliable { when_full }
-                } else {
-                    Reliability::BestEffort
-                };
-            }
+            (Policy::Reliability, ParameterValue::String(word)) => of.reliable = word == "reliable",
             (Policy::Durability, ParameterValue::String(word)) => {
-                self.qos.durability = if word == "transient_local" {
-                    Durability::TransientLocal
-                } else {
-                    Durability::Volatile
-                };
+                of.transient_local = word == "transient_local";
             }
-            (Policy::History, ParameterValue::String(word)) => {
-                self.qos.history = if word == "keep_all" {
-                    History::KeepAll
-                } else {
-                    self.keep_last()
-                };
-            }
+            (Policy::History, ParameterValue::String(word)) => of.keep_all = word == "keep_all",
             (Policy::Depth, ParameterValue::Integer(depth)) => {
-                self.depth = *depth;
-                if self.qos.history != History::KeepAll {
-                    self.qos.history = self.keep_last();
-                }
+                of.depth = usize::try_from(*depth).unwrap_or(1);
             }
             (_, ParameterValue::Integer(deadline)) => {
                 let deadline = u64::try_from(*deadline).ok().filter(|ns| *ns > 0);
-                self.qos.deadline = deadline.map(Duration::from_nanos);
+                of.deadline = deadline.map(Duration::from_nanos);
             }
             _ => return false,
         }
         true
-    }
-
-    fn keep_last(&self) -> History {
-        History::KeepLast {
-            depth: usize::try_from(self.depth).unwrap_or(1),
-        }
     }
 }

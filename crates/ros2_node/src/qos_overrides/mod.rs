@@ -2,10 +2,14 @@
 //! `qos_overrides./scan.publisher.reliability`.
 
 mod endpoint;
+mod policies;
 
 pub use endpoint::{Endpoint, PREFIX, Role};
+pub use policies::Policies;
 
-use super::participant::QosProfile;
+#[cfg(feature = "client")]
+use ros2_client::QosProfile;
+
 use crate::parameters::{Kind, ParameterValue};
 use crate::text::quoted;
 use endpoint::Policy;
@@ -115,12 +119,13 @@ impl QosOverrides {
     }
 
     /// Returns the quality of service of a topic, `default` where it cannot be overridden.
+    #[cfg(feature = "client")]
     #[must_use]
     pub fn profile(&self, topic: &str, role: Role, default: &QosProfile) -> QosProfile {
         self.endpoints
             .iter()
             .find(|endpoint| endpoint.topic == topic && endpoint.role == role)
-            .map_or_else(|| default.clone(), |endpoint| endpoint.qos.clone())
+            .map_or_else(|| default.clone(), |end| end.policies.over(default))
     }
 
     /// Returns the absolute names of the topics.
@@ -143,7 +148,7 @@ impl QosOverrides {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "client"))]
 mod tests {
     use std::time::Duration;
 

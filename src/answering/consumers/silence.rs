@@ -1,0 +1,30 @@
+//! Why an output is held back.
+
+use crate::answering::health::Unexpected;
+use crate::convert::FlightStackError;
+use crate::frames::AttitudeError;
+
+/// Why an output is held back for a frame.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub(crate) enum Silence {
+    #[error("the receiver's attitude: {0}")]
+    Attitude(#[from] AttitudeError),
+    #[error(transparent)]
+    FlightStack(#[from] FlightStackError),
+    #[error(
+        "the track is not confirmed yet, or this frame contradicted it: it needs a few consistent frames"
+    )]
+    NoTrack,
+    #[error("no probability follows from the covariance of the position")]
+    NoProbability,
+    #[error("{0}: see unexpected_attitude")]
+    UnexpectedAttitude(Unexpected),
+    #[error("protection levels are not available, or exceed an alert limit: see integrity")]
+    NotProtected,
+}
+
+impl From<Unexpected> for Silence {
+    fn from(unexpected: Unexpected) -> Self {
+        Self::UnexpectedAttitude(unexpected)
+    }
+}
