@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! bin, ros            the only layers with files, clocks, threads and ros2-client
+//! recording           messages in files: MCAP and bags of rosbag2, and CDR, their bytes
 //! convert, messages   plain types <-> the messages of ROS
 //! simulation          seeded approaches and synthetic detections, for tools and tests
 //! picture             the geometry of a frame in space, for display
@@ -33,6 +34,8 @@ pub mod integrity;
 pub mod messages;
 pub mod picture;
 pub mod pipeline;
+#[cfg(feature = "bags")]
+pub mod recording;
 pub mod refuelling;
 #[cfg(feature = "ros")]
 pub mod ros;

@@ -187,7 +187,8 @@ impl StartValues {
     }
 }
 
-#[cfg(all(test, feature = "client"))]
+#[cfg(test)]
+#[cfg(feature = "client")]
 mod tests {
     use super::super::participant::reliable;
     use super::super::qos_overrides::{Endpoint, Role};

@@ -148,7 +148,8 @@ impl QosOverrides {
     }
 }
 
-#[cfg(all(test, feature = "client"))]
+#[cfg(test)]
+#[cfg(feature = "client")]
 mod tests {
     use std::time::Duration;
 
