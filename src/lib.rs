@@ -5,6 +5,8 @@
 //!
 //! ```text
 //! bin, ros            the only layers with files, clocks, threads and ros2-client
+//! replay              a recording answered as the node answers its topics
+//! answering           what the node does with a message, wherever it comes from
 //! recording           messages in files: MCAP and bags of rosbag2, and CDR, their bytes
 //! convert, messages   plain types <-> the messages of ROS
 //! simulation          seeded approaches and synthetic detections, for tools and tests
@@ -22,7 +24,7 @@
 //! aircraft) and `camera` (always the optical frame: x right, y down, z ahead). SI units and radians
 //! throughout; a suffix names anything else (`_px`, `_deg`).
 
-#[cfg(feature = "ros")]
+#[cfg(any(feature = "ros", feature = "bags"))]
 pub mod answering;
 pub mod camera;
 pub mod config;
@@ -37,6 +39,8 @@ pub mod pipeline;
 #[cfg(feature = "bags")]
 pub mod recording;
 pub mod refuelling;
+#[cfg(feature = "bags")]
+pub mod replay;
 #[cfg(feature = "ros")]
 pub mod ros;
 pub mod simulation;

@@ -1,10 +1,8 @@
 //! Numbers and words in messages.
 
-#[cfg(any(feature = "ros", feature = "bags"))]
-pub(crate) use ros2_node::text::path;
 pub(crate) use ros2_node::text::{MAX_NAME_BYTES, clip, list, quoted};
-#[cfg(feature = "ros")]
-pub(crate) use ros2_node::text::{echoed, line};
+#[cfg(any(feature = "ros", feature = "bags"))]
+pub(crate) use ros2_node::text::{echoed, line, path};
 
 /// Returns a number with three significant digits: residuals and depths range from nanometres to kilometres.
 pub(crate) fn digits(value: f64) -> String {

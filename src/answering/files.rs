@@ -47,12 +47,13 @@ pub enum FilesError {
 }
 
 /// What the files of a configuration hold.
-pub(crate) struct Files {
-    pub(crate) map: MarkerMap,
-    /// None where no output needs one.
-    pub(crate) setup: Option<RefuellingSetup>,
+pub struct Files {
+    /// The markers.
+    pub map: MarkerMap,
+    /// Receptacle, probe and mount; `None` where no output needs them.
+    pub setup: Option<RefuellingSetup>,
     /// What the calibration may have wrong, if a file says it.
-    pub(crate) calibration: Option<CalibrationBudget>,
+    pub calibration: Option<CalibrationBudget>,
 }
 
 impl Files {
@@ -60,7 +61,7 @@ impl Files {
     ///
     /// # Errors
     /// [`FilesError`] of a file that cannot be read or used.
-    pub(crate) fn read(configuration: &Configuration) -> Result<Self, FilesError> {
+    pub fn read(configuration: &Configuration) -> Result<Self, FilesError> {
         Ok(Self {
             map: marker_map(&configuration.marker_map)?,
             setup: refuelling_setup(&configuration.consumers)?,

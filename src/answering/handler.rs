@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::attitudes::{AttitudeMessage, Attitudes, NoReportedAttitude};
 use super::clock::Clock;
 use super::consumers::{Consumers, Protection, Silence};
+use super::diagnostics::Tally;
 use super::files::Files;
 use super::health::Watch;
 use super::input::{InputMessage, InputReader, Sighting};
@@ -24,7 +25,7 @@ use ros2_node::names::{NamesError, NodeNames};
 use ros2_node::once::SaidOnce;
 
 /// The pipeline between its messages.
-pub(crate) struct Handler {
+pub struct Handler {
     pipeline: Pipeline,
     reader: InputReader,
     attitudes: Attitudes,
@@ -40,7 +41,7 @@ impl Handler {
     ///
     /// # Errors
     /// [`NamesError`] of a remap.
-    pub(crate) fn new(
+    pub fn new(
         configuration: &Configuration,
         files: Files,
         outputs: Outputs,
@@ -74,17 +75,24 @@ impl Handler {
     }
 
     /// Begins or ends answers. While it is not active, camera infos still count and detections are only counted.
-    pub(crate) const fn set_active(&mut self, on: bool) {
+    pub const fn set_active(&mut self, on: bool) {
         self.active = on;
     }
 
+    /// What has been counted.
+    #[must_use]
+    pub const fn tally(&self) -> &Tally {
+        &self.monitor.tally
+    }
+
     /// Returns its outputs, for another handler.
-    pub(crate) fn into_outputs(self) -> Outputs {
+    #[must_use]
+    pub fn into_outputs(self) -> Outputs {
         self.outputs
     }
 
     /// Takes a camera info.
-    pub(crate) fn on_camera_info(&mut self, message: &CameraInfo) {
+    pub fn on_camera_info(&mut self, message: &CameraInfo) {
         let info = convert::camera_info(message);
         let result = self.pipeline.set_camera(&info, &message.header.frame_id);
         self.monitor
@@ -95,7 +103,7 @@ impl Handler {
     }
 
     /// Takes the detections of an image; publishes what becomes of them.
-    pub(crate) fn on_detections(&mut self, message: InputMessage) {
+    pub fn on_detections(&mut self, message: InputMessage) {
         let begin = self.clock.now();
         self.monitor.on_detections(self.input(), begin);
         if !self.active {
@@ -167,19 +175,19 @@ impl Handler {
     }
 
     /// Takes a sample of the receiver's attitude.
-    pub(crate) fn on_attitude(&mut self, message: &AttitudeMessage) {
+    pub fn on_attitude(&mut self, message: &AttitudeMessage) {
         self.monitor.on_decoded(ATTITUDE);
         self.attitudes.on_receiver(message, self.clock.now());
     }
 
     /// Takes a sample of the tanker's attitude.
-    pub(crate) fn on_tanker_attitude(&mut self, message: &AttitudeMessage) {
+    pub fn on_tanker_attitude(&mut self, message: &AttitudeMessage) {
         self.monitor.on_decoded(TANKER_ATTITUDE.name);
         self.attitudes.on_tanker(message, self.clock.now());
     }
 
     /// Takes changed parameters, for the next frame on.
-    pub(crate) fn on_configuration(&mut self, configuration: Configuration) {
+    pub fn on_configuration(&mut self, configuration: Configuration) {
         if let Some(consumers) = &mut self.outputs.consumers {
             consumers.on_configuration(&configuration.consumers);
         }
@@ -191,30 +199,30 @@ impl Handler {
     }
 
     /// Says what a configuration means, if that is new.
-    pub(crate) fn understand(&mut self, configuration: &Configuration) {
+    pub fn understand(&mut self, configuration: &Configuration) {
         let geometry = self.outputs.consumers.as_ref().map(Consumers::geometry);
         self.monitor
             .understand(configuration, &self.reader.map, geometry);
     }
 
     /// Forgets the track and the last attitude.
-    pub(crate) fn on_reset(&mut self) {
+    pub fn on_reset(&mut self) {
         self.pipeline.reset();
         self.monitor.on_reset();
     }
 
     /// Records a sample on `topic` that could not be decoded.
-    pub(crate) fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display) {
+    pub fn on_undecodable(&mut self, topic: &str, error: &dyn fmt::Display) {
         self.monitor.on_undecodable(topic, self.input(), error);
     }
 
     /// Records samples on `topic` that were skipped because newer ones waited behind them.
-    pub(crate) fn on_lost(&mut self, topic: &str, count: u64) {
+    pub fn on_lost(&mut self, topic: &str, count: u64) {
         self.monitor.on_lost(topic, count);
     }
 
     /// Looks for faults and publishes the diagnostics; `publishers`: of the input, whatever they send.
-    pub(crate) fn on_second(&mut self, publishers: usize, graph: &Graph) {
+    pub fn on_second(&mut self, publishers: usize, graph: &Graph) {
         let subject = Subject {
             active: self.active,
             input: self.input(),

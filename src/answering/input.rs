@@ -19,6 +19,18 @@ pub enum InputMessage {
     AprilTags(AprilTagDetectionArray),
 }
 
+impl InputMessage {
+    /// Returns the time of the image and the camera's optical frame.
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        match self {
+            Self::FeaturePoints(message) => &message.header,
+            Self::Detections(message) => &message.header,
+            Self::AprilTags(message) => &message.header,
+        }
+    }
+}
+
 /// The content of one message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {

@@ -21,7 +21,7 @@ pub mod clock;
 pub mod consumers;
 pub mod diagnostics;
 pub mod files;
-pub(crate) mod handler;
+pub mod handler;
 pub mod health;
 pub mod input;
 pub mod integrity;

@@ -63,11 +63,7 @@ impl Outputs {
     }
 
     /// Applies reloaded settings; the outputs and their names stay fixed.
-    pub(crate) fn configure(
-        &mut self,
-        configuration: &Configuration,
-        setup: Option<RefuellingSetup>,
-    ) {
+    pub fn configure(&mut self, configuration: &Configuration, setup: Option<RefuellingSetup>) {
         if let Some(integrity) = &mut self.integrity {
             integrity.reset();
         }

@@ -3,7 +3,7 @@
 use crate::estimation::{Initialisation, Refinement};
 
 /// Source of the receiver's attitude.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AttitudeSource {
     /// `px4_msgs/VehicleAttitude`.
     Px4,
@@ -12,7 +12,7 @@ pub enum AttitudeSource {
 }
 
 /// Message type of the detections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Input {
     /// `tanker_pose/FeaturePointArray`.
     FeaturePoints,

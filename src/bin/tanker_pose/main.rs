@@ -7,8 +7,10 @@ mod options;
 #[cfg(feature = "ros")]
 mod parameters;
 mod plot;
+#[cfg(feature = "bags")]
+mod replay;
 mod reproduce;
-#[cfg(feature = "ros")]
+#[cfg(any(feature = "ros", feature = "bags"))]
 mod ros_options;
 #[cfg(feature = "ros")]
 mod simulate;
@@ -46,6 +48,8 @@ enum Tool {
     Watch(watch::Arguments),
     /// Solve frames given as JSON Lines, without ROS
     Solve(Box<solve::Arguments>),
+    #[cfg(feature = "bags")]
+    Replay(Box<replay::Arguments>),
     /// Check marker map, camera and error budget together before flight
     Check(Box<check::Arguments>),
     /// Reproduce the paper's experiments: tables and plots
@@ -62,6 +66,8 @@ fn main() -> ExitCode {
         Tool::Parameters(arguments) => parameters::run(&arguments).map_err(Into::into),
         #[cfg(feature = "ros")]
         Tool::Watch(arguments) => watch::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "bags")]
+        Tool::Replay(arguments) => return replay::run(&arguments),
         // Its exit code also says what it found.
         Tool::Check(arguments) => return check::run(&arguments),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),

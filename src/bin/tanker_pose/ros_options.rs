@@ -1,12 +1,16 @@
 //! Options of tools that are nodes: ROS arguments, and numbers within bounds.
 
 use clap::Args;
-use tanker_pose::ros::arguments::{ArgumentError, Arguments};
-use tanker_pose::ros::names::NodeNames;
-use tanker_pose::ros::overrides::{Overrides, Place};
-use tanker_pose::ros::parameter_file::ParameterFileError;
+use ros2_node::arguments::{ArgumentError, Arguments};
+#[cfg(feature = "ros")]
+use ros2_node::names::NodeNames;
+#[cfg(feature = "ros")]
+use ros2_node::overrides::{Overrides, Place};
+#[cfg(feature = "ros")]
+use ros2_node::parameter_file::ParameterFileError;
 
 /// Launch files set it for every node; a tool that takes no time from `/clock` need not mind.
+#[cfg(feature = "ros")]
 const SIM_TIME: &str = "use_sim_time";
 
 /// `--ros-args`, as every ROS program takes them.
@@ -36,6 +40,7 @@ impl RosOptions {
 }
 
 /// Why parameters given to a tool without any are refused.
+#[cfg(feature = "ros")]
 #[derive(Debug, thiserror::Error)]
 pub enum NoParametersError {
     #[error(
@@ -52,6 +57,7 @@ pub enum NoParametersError {
 ///
 /// # Errors
 /// [`NoParametersError`] when `-p` sets one, or a file cannot be read.
+#[cfg(feature = "ros")]
 pub fn check_no_parameters(
     arguments: &Arguments,
     names: &NodeNames,
@@ -78,10 +84,12 @@ pub fn check_no_parameters(
 }
 
 /// Returns a parser of numbers within bounds.
+#[cfg(feature = "ros")]
 pub fn between(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text: &str| number(text, min, max)
 }
 
+#[cfg(feature = "ros")]
 fn number(text: &str, min: f64, max: f64) -> Result<f64, String> {
     let value: f64 = text
         .parse()

@@ -1,6 +1,8 @@
 //! `tanker_pose simulate`: a seeded approach, published as a camera and a detector would.
 
 mod approach_options;
+#[cfg(feature = "bags")]
+mod bag;
 pub mod fault;
 mod pace;
 mod report;
@@ -15,7 +17,7 @@ use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::names::NamesError;
 use tanker_pose::ros::participant::{EndpointError, NodeOptions, RosNode, within};
 use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
-use tanker_pose::simulation::Approach;
+use tanker_pose::simulation::{Approach, SimulatedFrame};
 
 use crate::ros_options::{RosOptions, between};
 use crate::tool_node::{JoinError, ToolNode};
@@ -49,6 +51,10 @@ pub struct Arguments {
     /// Print one JSON object for every frame, and nothing else
     #[arg(long)]
     json: bool,
+    /// Write the approach into this MCAP file at once, instead of publishing it; no ROS is needed
+    #[cfg(feature = "bags")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["repeat", "json", "ros_args"])]
+    bag: Option<std::path::PathBuf>,
     #[command(flatten)]
     ros: RosOptions,
     // Headings hold for all that comes after them: from here on in this order.
@@ -75,11 +81,22 @@ pub enum SimulateError {
     Endpoint(#[from] EndpointError),
     #[error(transparent)]
     Source(#[from] SourceError),
+    #[cfg(feature = "bags")]
+    #[error(transparent)]
+    Bag(#[from] bag::BagError),
 }
 
 /// Publishes the approach until it ends, or until SIGINT or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<(), SimulateError> {
     let (approach, camera_info) = arguments.approach.read()?;
+    #[cfg(feature = "bags")]
+    if let Some(path) = &arguments.bag {
+        let mut bag = bag::Bag::create(path, &camera_info, &arguments.frame_id)?;
+        for index in 0..approach.frame_count() {
+            bag.write(&arguments.frame(&approach, index).0)?;
+        }
+        return Ok(bag.finish()?);
+    }
     let mut node = ToolNode::join(NODE_NAME, &arguments.ros, None, NodeOptions::new())?;
     let length = (!arguments.repeat).then(|| approach.frame_count());
     let report = Report::new(arguments.json, length, arguments.approach.rate_hz);
@@ -121,6 +138,25 @@ fn introduce(
         names.topic(source::TRUTH)?,
     ));
     Ok(())
+}
+
+impl Arguments {
+    /// Returns a frame, and the id of the detection that was moved.
+    fn frame(&self, approach: &Approach, index: u32) -> (SimulatedFrame, Option<u32>) {
+        let mut frame = approach.frame(index);
+        let every = self.gross_error_every;
+        let fault = if every > 0 && (index + 1).is_multiple_of(every) {
+            gross_error(
+                &mut frame.detections,
+                self.gross_error_px,
+                self.approach.seed,
+                index,
+            )
+        } else {
+            None
+        };
+        (frame, fault)
+    }
 }
 
 struct Simulation<'a> {
@@ -184,18 +220,7 @@ impl Simulation<'_> {
     }
 
     fn publish_frame(&mut self, number: u64, index: u32) -> Result<(), SimulateError> {
-        let mut frame = self.approach.frame(index);
-        let every = self.arguments.gross_error_every;
-        let fault = if every > 0 && (index + 1).is_multiple_of(every) {
-            gross_error(
-                &mut frame.detections,
-                self.arguments.gross_error_px,
-                self.arguments.approach.seed,
-                index,
-            )
-        } else {
-            None
-        };
+        let (frame, fault) = self.arguments.frame(&self.approach, index);
         let sent = self
             .source
             .publish(&frame.truth_camera_from_tanker, &frame.detections)?;
