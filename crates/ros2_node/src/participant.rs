@@ -72,6 +72,17 @@ pub async fn within<T>(patience: Duration, future: impl Future<Output = T>) -> O
     }
 }
 
+/// How often the graph is asked anew by [`asked_anew`].
+const ASK_AGAIN: Duration = Duration::from_millis(20);
+
+/// Waits for a peer, possibly forever: `wait` makes one of ros2-client's waits for a publisher or a subscription.
+///
+/// Such a wait listens to a short queue of events and can miss the one it waits for. A new wait looks at what has
+/// matched already, so it is asked anew.
+pub async fn asked_anew<F: Future<Output = ()>>(wait: impl Fn() -> F) {
+    while within(ASK_AGAIN, wait()).await.is_none() {}
+}
+
 /// Why a node could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -9,7 +9,7 @@ use tanker_pose::ros::arguments::Arguments;
 use tanker_pose::ros::environment::Environment;
 use tanker_pose::ros::messages::{EstimatorStatus, PoseWithCovarianceStamped};
 use tanker_pose::ros::participant::{
-    NodeOptions, QosProfile, RosNode, Subscription, reliable, within,
+    NodeOptions, QosProfile, RosNode, Subscription, asked_anew, reliable, within,
 };
 use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS, POSE, STATUS};
 
@@ -108,8 +108,8 @@ impl Graph {
             .await
             .ok_or_else(|| lacking("no subscriber of feature_points and camera_info"))?;
         let answers = async {
-            self.pose.wait_for_publisher(node).await;
-            self.status.wait_for_publisher(node).await;
+            asked_anew(|| self.pose.wait_for_publisher(node)).await;
+            asked_anew(|| self.status.wait_for_publisher(node)).await;
         };
         within(patience, answers)
             .await

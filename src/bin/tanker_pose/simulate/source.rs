@@ -1,6 +1,6 @@
 //! The simulated camera and detector: their topics and stamps.
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use nalgebra::Isometry3;
 use ros2_client::WriteError;
@@ -9,7 +9,7 @@ use tanker_pose::pipeline::{Detection, Stamp};
 use tanker_pose::ros::convert::{camera_info_message, feature_points_message, pose_message};
 use tanker_pose::ros::messages::{CameraInfo, FeaturePointArray, Header, Message, PoseStamped};
 use tanker_pose::ros::participant::{
-    EndpointError, Publisher, QosProfile, RosNode, reliable, within,
+    EndpointError, Publisher, QosProfile, RosNode, asked_anew, reliable,
 };
 use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
 
@@ -17,8 +17,6 @@ use tanker_pose::ros::topics::{CAMERA_INFO, FEATURE_POINTS};
 pub const TRUTH: &str = "truth";
 /// One second of a 50 Hz camera, for subscribers that acknowledge late.
 const OUTPUT: QosProfile = reliable(50);
-/// How often the graph is asked whether somebody listens.
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 /// The middleware's fault, or a stamp that ROS cannot carry.
 #[derive(Debug, thiserror::Error)]
@@ -73,21 +71,8 @@ impl Source {
 
     /// Waits until both topics have a subscriber, possibly forever.
     pub async fn wait_for_subscribers(&self, ros: &RosNode) {
-        // The library's own wait can miss an event, its queue being short: asked anew, it cannot.
-        while within(
-            LOOK_AGAIN,
-            self.feature_points.wait_for_subscription(ros.node()),
-        )
-        .await
-        .is_none()
-        {}
-        while within(
-            LOOK_AGAIN,
-            self.camera_info.wait_for_subscription(ros.node()),
-        )
-        .await
-        .is_none()
-        {}
+        asked_anew(|| self.feature_points.wait_for_subscription(ros.node())).await;
+        asked_anew(|| self.camera_info.wait_for_subscription(ros.node())).await;
     }
 
     /// Publishes the camera info, the detections and the truth, in this order, stamped with the time it is.
