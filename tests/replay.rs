@@ -374,3 +374,26 @@ fn topics_of_another_type_or_definition_are_named_and_not_decoded() {
     assert_eq!(found.code, 2, "{}", found.words);
     assert!(found.words.contains("float32 v"), "{}", found.words);
 }
+
+#[test]
+fn warnings_beyond_the_first_twenty_are_counted() {
+    let scratch = Scratch::new("warnings");
+    let approach = scratch.simulated("120", "1");
+    // Every other frame has no number, so refusals begin sixty times.
+    let blinking = scratch.rewritten(&approach, |mut message| {
+        if message.is("/feature_points") {
+            let mut points: FeaturePointArray = message.decode().expect("detections");
+            if points.header.stamp.sec % 2 == 1 {
+                points.points[0].u = f64::NAN;
+                message.bytes = cdr::encode(&points).expect("a message of ROS");
+            }
+        }
+        vec![message]
+    });
+    let found = Replayed::of(&scratch, &blinking, &[]);
+    let lines = found.words.lines();
+    let printed = lines.filter(|line| line.starts_with("tanker_pose: warning: "));
+    assert_eq!(printed.count(), 20, "{}", found.words);
+    let rest = "40 more warnings; the statuses in ";
+    assert!(found.words.contains(rest), "{}", found.words);
+}

@@ -7,6 +7,8 @@
 //! sqlite_file     one `SQLite` file of rosbag2
 //! damage          what of a recording cannot be read, and why
 //! writer          MCAP files; the same messages give the same bytes
+//! read_ahead      a recording read by a thread of its own
+//! write_behind    a recording written by a thread of its own
 //! definitions     of the message types that are written
 //! message, cdr    one message, and its bytes <-> the structs of `messages`
 //! ```
@@ -42,11 +44,15 @@ pub mod definitions;
 mod folder;
 mod mcap_file;
 mod message;
+mod read_ahead;
 mod reader;
 mod sqlite_file;
+mod write_behind;
 mod writer;
 
 pub use damage::{Damage, OpenError};
 pub use message::{DecodeError, Definition, RecordedMessage, RecordedTopic, type_name};
+pub use read_ahead::ReadAhead;
 pub use reader::Recording;
+pub use write_behind::WriteBehind;
 pub use writer::{Channel, WriteError, Writer};

@@ -18,7 +18,7 @@ use crate::text;
 const CHUNK: u64 = 1 << 20;
 
 /// Why a recording cannot be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[error("cannot write {}: {reason}", text::path(path))]
 pub struct WriteError {
     path: PathBuf,
@@ -132,11 +132,16 @@ impl Writer {
         }
     }
 
-    fn failed(&self, error: &mcap::McapError) -> WriteError {
-        let cause = std::error::Error::source(error).map(ToString::to_string);
+    /// Returns an error about this file.
+    pub(super) fn error(&self, reason: &str) -> WriteError {
         WriteError {
             path: self.path.clone(),
-            reason: cause.unwrap_or_else(|| error.to_string()),
+            reason: reason.to_owned(),
         }
+    }
+
+    fn failed(&self, error: &mcap::McapError) -> WriteError {
+        let cause = std::error::Error::source(error).map(ToString::to_string);
+        self.error(&cause.unwrap_or_else(|| error.to_string()))
     }
 }

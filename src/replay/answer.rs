@@ -12,7 +12,9 @@ use crate::answering::clock::Clock;
 use crate::answering::handler::Handler;
 use crate::answering::outputs::Outputs;
 use crate::pipeline::OutcomeCode;
-use crate::recording::{Channel, RecordedMessage, RecordedTopic, Recording, Writer, definitions};
+use crate::recording::{
+    Channel, ReadAhead, RecordedMessage, RecordedTopic, Recording, WriteBehind, Writer, definitions,
+};
 use crate::text::clip;
 
 const SECOND_NS: u64 = 1_000_000_000;
@@ -57,13 +59,14 @@ impl Replay {
     /// [`ReplayError`] when the answers cannot be written. What cannot be read is in the [`Summary`].
     pub fn answer(
         self,
-        mut recording: Recording,
+        recording: Recording,
         writer: Writer,
         copies: bool,
         mut progress: impl FnMut(u64, u64),
     ) -> Result<Summary, ReplayError> {
-        let shared = Shared::new(writer);
-        let mut answering = Answering::begin(self, &recording, shared.clone(), copies)?;
+        let shared = Shared::new(WriteBehind::start(writer)?);
+        let mut answering = Answering::begin(self, recording.topics(), shared.clone(), copies)?;
+        let mut recording = ReadAhead::start(recording).map_err(ReplayError::Thread)?;
         let mut group: Vec<RecordedMessage> = Vec::new();
         while let Some(item) = recording.next() {
             let message = match item {
@@ -95,7 +98,7 @@ impl Replay {
 impl Answering {
     fn begin(
         node: Replay,
-        recording: &Recording,
+        topics: &[Arc<RecordedTopic>],
         shared: Shared,
         copies: bool,
     ) -> Result<Self, ReplayError> {
@@ -118,12 +121,12 @@ impl Answering {
         handler.set_active(true);
         let routes = Routes::new(&configuration, &names)?;
         let mut summary = Summary::default();
-        for topic in recording.topics() {
+        for topic in topics {
             if let Err(words) = routes.of(topic) {
                 summary.skip(format!("{}: {words}", clip(&topic.name)));
             }
         }
-        let graph = routes.graph(recording.topics());
+        let graph = routes.graph(topics);
         let input = names.topic(configuration.input.topic().name)?;
         Ok(Self {
             publishers: graph.heard(&input),

@@ -44,6 +44,9 @@ pub enum ReplayError {
     /// The answers cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The recording is read beside the work on it.
+    #[error("cannot start a thread that reads the recording: {0}")]
+    Thread(std::io::Error),
 }
 
 /// A node as its arguments configure it, before its recording.

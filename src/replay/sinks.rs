@@ -9,12 +9,12 @@ use super::ReplayError;
 use crate::answering::output::{Output, Sink, Sinks};
 use crate::answering::topics::Topic;
 use crate::messages::Message;
-use crate::recording::{Channel, RecordedTopic, WriteError, Writer, cdr, type_name};
+use crate::recording::{Channel, RecordedTopic, WriteBehind, WriteError, cdr, type_name};
 
 /// A recording that several topics write to.
 #[derive(Clone)]
 pub(super) struct Shared {
-    writer: Rc<RefCell<Writer>>,
+    writer: Rc<RefCell<WriteBehind>>,
     /// Log time of what is written now.
     pub(super) time_ns: Rc<Cell<u64>>,
     /// Why nothing more could be written.
@@ -22,7 +22,7 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(writer: Writer) -> Self {
+    pub(super) fn new(writer: WriteBehind) -> Self {
         Self {
             writer: Rc::new(RefCell::new(writer)),
             time_ns: Rc::default(),

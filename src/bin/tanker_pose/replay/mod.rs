@@ -110,6 +110,13 @@ fn answer(arguments: &Arguments, bar: &ProgressBar) -> Result<Summary, Error> {
 }
 
 fn say(summary: &Summary, output: &Path) {
+    let unprinted = warnings::unprinted();
+    if unprinted > 0 {
+        eprintln!(
+            "tanker_pose: {unprinted} more warnings; the statuses in {} say what became of each frame",
+            output.display()
+        );
+    }
     for words in &summary.skipped {
         eprintln!("tanker_pose: skipped: {words}");
     }
