@@ -28,7 +28,7 @@ pub use crate::{convert, messages};
 pub use ros2_node::{
     arguments, clock, distribution, environment, graph, jump, leave, lifecycle, logging, names,
     newest, once, overrides, parameter_file, parameters, participant, qos_overrides, rtps, rules,
-    running_nodes, service, sim_time, start_values, system_clock,
+    running_nodes, service, sim_time, start_values, supervisor, system_clock,
 };
 
 /// What the targets of this package's log lines begin with: those of its library and of its programs.

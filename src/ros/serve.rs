@@ -13,6 +13,7 @@ use super::newest::Newest;
 use super::parameters::SharedParameters;
 use super::participant::{EndpointError, RosNode};
 use super::sim_time::SimTime;
+use super::supervisor::Supervisor;
 use super::topics;
 use crate::answering::clock::Clock;
 use crate::answering::files::Files;
@@ -28,7 +29,7 @@ use crate::text;
 const CAMERA_INFO: &str = topics::CAMERA_INFO.name;
 const TANKER_ATTITUDE: &str = topics::TANKER_ATTITUDE.name;
 
-/// How often the loop looks whether it could run at all.
+/// How often the loop looks whether it could run at all, and whether the service manager waits for a sign of life.
 const BEAT: Duration = Duration::from_millis(100);
 /// How long the middleware gets, after a time in which nothing of this process ran, to read what waits in its
 /// sockets: only then can the newest samples be told.
@@ -54,6 +55,7 @@ pub(super) struct Server<'a> {
     lifecycle: Option<Lifecycle>,
     requests: Option<smol::channel::Receiver<Request>>,
     clock: NodeClock,
+    supervisor: Supervisor,
     parameters: SharedParameters,
     environment: &'a Environment,
     ros: &'a mut RosNode,
@@ -74,6 +76,7 @@ impl<'a> Server<'a> {
             lifecycle: None,
             requests: None,
             clock: clock.clone(),
+            supervisor: Supervisor::from_process(),
             parameters: parameters.clone(),
             environment,
             ros,
@@ -120,17 +123,31 @@ impl<'a> Server<'a> {
         changes: smol::channel::Receiver<()>,
         resets: smol::channel::Receiver<()>,
     ) -> Result<(), NodeError> {
+        self.supervisor.ready();
+        let served = self.work_until(stop, changes, resets).await;
+        self.supervisor.stopping();
+        served
+    }
+
+    async fn work_until(
+        &mut self,
+        stop: impl Future<Output = ()>,
+        changes: smol::channel::Receiver<()>,
+        resets: smol::channel::Receiver<()>,
+    ) -> Result<(), NodeError> {
         let requests = self.requests.take().unwrap_or_else(no_requests).fuse();
         let (stop, changes, resets) = (stop.fuse(), changes.fuse(), resets.fuse());
         pin_mut!(stop, changes, resets, requests);
         let seconds = StreamExt::fuse(smol::Timer::interval(Duration::from_secs(1)));
-        pin_mut!(seconds);
+        let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
+        pin_mut!(seconds, beats);
         let inputs = loop {
             if let Some(inputs) = self.inputs.take() {
                 break inputs;
             }
             select_biased! {
                 () = stop => return Ok(()),
+                _ = beats.select_next_some() => self.supervisor.alive(Instant::now()),
                 _ = seconds.select_next_some() => self.ros.check_alive()?,
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Handler::on_reset),
@@ -153,9 +170,8 @@ impl<'a> Server<'a> {
             (ATTITUDE, lost_attitudes),
             (TANKER_ATTITUDE, lost_of_tanker),
         ];
-        let beats = StreamExt::fuse(smol::Timer::interval(BEAT));
         let mut last_beat = Instant::now();
-        pin_mut!(camera_infos, attitudes, of_tanker, detections, beats);
+        pin_mut!(camera_infos, attitudes, of_tanker, detections);
         loop {
             // In this order when several are ready: a camera info or a parameter that came before a
             // frame counts for it.
@@ -166,6 +182,7 @@ impl<'a> Server<'a> {
                         smol::Timer::after(CATCH_UP).await;
                     }
                     last_beat = Instant::now();
+                    self.supervisor.alive(last_beat);
                 }
                 () = changes.select_next_some() => self.on_change(),
                 () = resets.select_next_some() => self.with(Handler::on_reset),

@@ -23,6 +23,7 @@
 //! messages                           the messages of all this, and the trait of all messages
 //! newest                             skipping samples beyond a topic's depth
 //! graph, discovered, running_nodes   the other endpoints of topics; nodes found by what they publish
+//! supervisor                         what systemd is told
 //! logging, once                      log lines as ROS has them; lasting conditions are logged once
 //! text, text_file                    foreign text in messages; files from outside
 //! ```
@@ -85,5 +86,7 @@ pub mod service;
 pub mod sim_time;
 #[cfg(feature = "arguments")]
 pub mod start_values;
+#[cfg(feature = "client")]
+pub mod supervisor;
 #[cfg(feature = "arguments")]
 mod tokens;
