@@ -12,6 +12,9 @@ use serde_saphyr::{DuplicateKeyPolicy, MergeKeyPolicy};
 
 use crate::text::quoted;
 
+/// Letters of a long reason that are shown from its start and from its end.
+const SHOWN: usize = 300;
+
 /// The position of an error: `config/tankers/paper.yaml:7:9`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -80,7 +83,7 @@ pub fn read<T: DeserializeOwned>(text: &str, source: &str) -> Result<T, YamlErro
         let message = plainly(&error, text, location);
         YamlError {
             place: Place::at(source, location),
-            reason: message.replace(char::is_control, " "),
+            reason: shortened(message.replace(char::is_control, " ")),
         }
     })
 }
@@ -116,6 +119,17 @@ fn plainly(error: &Error, text: &str, location: Location) -> String {
         }
         other => DefaultMessageFormatter.format_message(other).into_owned(),
     }
+}
+
+/// Returns a reason without the middle of a long one, which can only be a long word of the file.
+fn shortened(reason: String) -> String {
+    let count = reason.chars().count();
+    if count <= 2 * SHOWN {
+        return reason;
+    }
+    let start: String = reason.chars().take(SHOWN).collect();
+    let end: String = reason.chars().skip(count - SHOWN).collect();
+    format!("{start}… …{end}")
 }
 
 /// Returns the common word for a type of YAML or Rust.
@@ -241,6 +255,20 @@ mod tests {
             let error = refusal(text).to_string();
             assert!(error.ends_with(words), "{text:?} gave {error}");
         }
+    }
+
+    #[test]
+    fn long_words_of_a_file_do_not_make_long_errors() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        enum Choice {
+            #[serde(rename = "a")]
+            A,
+        }
+        let text = "ü".repeat(10_000);
+        let error = read::<Choice>(&text, "s.yaml").expect_err("no choice");
+        assert!(error.reason.len() < 1400, "{} bytes", error.reason.len());
+        assert!(read::<Choice>("a", "s.yaml").is_ok_and(|choice| matches!(choice, Choice::A)));
     }
 
     #[test]

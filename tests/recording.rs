@@ -309,3 +309,36 @@ fn what_is_no_recording_is_refused_by_name() {
         .expect("empty");
     assert!(refused.to_string().contains("metadata.yaml"), "{refused}");
 }
+
+#[test]
+fn chunk_that_begins_before_its_announced_time_is_read_and_named() {
+    let scratch = Scratch::new("late");
+    let mut file = mcap_file(options(None));
+    let chunks = |file: &[u8]| -> usize {
+        let (mut at, chunk) = (8, mcap::records::op::CHUNK);
+        while file[at] != chunk {
+            let length: [u8; 8] = file[at + 1..at + 9].try_into().expect("eight bytes");
+            at += 9 + usize::try_from(u64::from_le_bytes(length)).expect("small");
+        }
+        at
+    };
+    let first_time = chunks(&file) + 9;
+    file[first_time..first_time + 8].copy_from_slice(&15_u64.to_le_bytes());
+    let (messages, damages) = read(&scratch.file("late.mcap", &file));
+    assert_eq!(messages, whole());
+    assert!(
+        damages.len() == 1 && damages[0].contains("older than it says"),
+        "{damages:?}"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_is_refused_before_it_is_waited_for() {
+    let scratch = Scratch::new("pipe");
+    let path = scratch.0.join("pipe.mcap");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.expect("mkfifo").success());
+    let error = Recording::open(&path).err().expect("nobody writes");
+    assert!(error.to_string().contains("is not a file"), "{error}");
+}

@@ -24,6 +24,9 @@ const MAX_COEFFICIENT: f64 = 1000.0;
 /// Eigenvalues and pivots below this, relative to the variances, are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
+/// Smallest sigma above 0: the square of a much smaller one is 0, and what is divided by it no number.
+const LEAST: f64 = 1e-12;
+
 /// Checked error budget of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationBudget {
@@ -63,7 +66,7 @@ pub enum CalibrationBudgetError {
         got: String,
     },
     /// Not a plausible standard deviation.
-    #[error("{place}: the sigma of {name} must be 0 to {most}, got {value}")]
+    #[error("{place}: the sigma of {name} must be 0, or {LEAST:e} to {most}, got {value}")]
     Sigma {
         place: Place,
         name: &'static str,
@@ -333,7 +336,7 @@ fn checked_sigma(
     } else {
         MAX_COEFFICIENT
     };
-    if (0.0..=most).contains(&value) {
+    if value == 0.0 || (LEAST..=most).contains(&value) {
         return Ok(value);
     }
     Err(CalibrationBudgetError::Sigma {

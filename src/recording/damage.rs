@@ -16,6 +16,9 @@ pub enum OpenError {
         /// The system's error.
         source: std::io::Error,
     },
+    /// A pipe, a device, a folder in a bag.
+    #[error("{} is not a file: a recording is read at several places, which a pipe or a device does not allow", text::path(.0))]
+    NoFile(PathBuf),
     /// Neither format.
     #[error("{} is neither an MCAP file nor an SQLite file of rosbag2", text::path(.0))]
     Unknown(PathBuf),
@@ -79,6 +82,18 @@ pub enum Damage {
         messages: Option<u64>,
         /// What is wrong.
         reason: String,
+    },
+    /// A chunk whose messages begin before the time that it is announced with.
+    #[error(
+        "{file}: messages of the chunk at byte {at} are up to {early_s:.3} s older than it says, and may come late"
+    )]
+    Late {
+        /// The file.
+        file: String,
+        /// Its place in the file.
+        at: u64,
+        /// By how much its first message is older, s.
+        early_s: f64,
     },
     /// Bytes that are no records.
     #[error("{file}: from byte {at} on there are no records ({reason}), {found}")]

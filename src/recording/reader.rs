@@ -25,6 +25,10 @@ impl Source {
             path: path.to_owned(),
             source,
         };
+        // Before it is opened: to open a named pipe waits until somebody writes to it.
+        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(OpenError::NoFile(path.to_owned()));
+        }
         let mut start = Vec::new();
         let file = std::fs::File::open(path).map_err(unreadable)?;
         file.take(16).read_to_end(&mut start).map_err(unreadable)?;

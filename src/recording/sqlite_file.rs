@@ -1,11 +1,15 @@
 //! One `SQLite` file of rosbag2: topics in one table, messages in another.
 
+mod bounds;
+
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rusqlite::{Connection, ErrorCode, OpenFlags, params};
 
+use self::bounds::{Cursor, ReadError, bound};
 use super::damage::{Damage, OpenError};
 use super::message::{Definition, RecordedMessage, RecordedTopic};
 
@@ -13,7 +17,6 @@ use super::message::{Definition, RecordedMessage, RecordedTopic};
 const MOST_ROWS: i64 = 1024;
 /// and of about this many bytes.
 const MOST_BYTES: usize = 1 << 22;
-
 const BY_TIME: &str = "SELECT id, topic_id, timestamp, data FROM messages WHERE (timestamp, id) > (?2, ?3) \
     ORDER BY timestamp, id LIMIT ?1";
 const BY_NUMBER: &str = "SELECT id, topic_id, timestamp, data FROM messages NOT INDEXED WHERE id > ?2 ORDER BY id LIMIT ?1";
@@ -21,16 +24,6 @@ const BY_NUMBER: &str = "SELECT id, topic_id, timestamp, data FROM messages NOT 
 /// Whether a file begins as those of `SQLite` do.
 pub(super) fn is_sqlite(start: &[u8]) -> bool {
     start.starts_with(b"SQLite format 3\0")
-}
-
-/// In which order rows are taken, after which row.
-#[derive(Debug, Clone, Copy)]
-enum Cursor {
-    /// By their times: time and number of the last row.
-    ByTime(i64, i64),
-    /// By their numbers, where the order by time cannot be read.
-    ByNumber(i64),
-    End,
 }
 
 /// The messages of a file by their times.
@@ -44,6 +37,8 @@ pub(super) struct SqliteFile {
     batch: VecDeque<RecordedMessage>,
     damages: VecDeque<Damage>,
     unknown: HashMap<i64, u64>,
+    /// Of `SQLite`, since the batch began.
+    steps: Arc<AtomicU64>,
 }
 
 impl SqliteFile {
@@ -53,8 +48,14 @@ impl SqliteFile {
             path: path.to_owned(),
             source,
         };
-        let database =
+        let mut database =
             Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(refused)?;
+        let size = std::fs::metadata(path).map_or(0, |found| found.len());
+        // What a recorder wrote last may stand in the file beside it.
+        let mut beside = path.as_os_str().to_owned();
+        beside.push("-wal");
+        let more = std::fs::metadata(beside).map_or(0, |found| found.len());
+        let steps = bound(&mut database, size.saturating_add(more)).map_err(refused)?;
         let mut damages = VecDeque::new();
         let mut cursor = Cursor::ByTime(i64::MIN, i64::MIN);
         let topics = match topics(&database) {
@@ -75,7 +76,7 @@ impl SqliteFile {
         let topics = topics.map_err(refused)?;
         Ok(Self {
             name: name.to_owned(),
-            size: std::fs::metadata(path).map_or(0, |found| found.len()),
+            size,
             passed: 0,
             database,
             topics,
@@ -83,6 +84,7 @@ impl SqliteFile {
             batch: VecDeque::new(),
             damages,
             unknown: HashMap::new(),
+            steps,
         })
     }
 
@@ -132,7 +134,8 @@ impl SqliteFile {
     }
 
     /// Reads a batch of rows.
-    fn read(&mut self) -> rusqlite::Result<()> {
+    fn read(&mut self) -> Result<(), ReadError> {
+        self.steps.store(0, Ordering::Relaxed);
         let sql = match self.cursor {
             Cursor::ByTime(..) => BY_TIME,
             Cursor::ByNumber(_) => BY_NUMBER,
@@ -147,10 +150,7 @@ impl SqliteFile {
         let (mut count, mut bytes) = (0, 0);
         while let Some(row) = rows.next()? {
             let (number, topic, time): (i64, i64, i64) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            self.cursor = match self.cursor {
-                Cursor::ByTime(..) => Cursor::ByTime(time, number),
-                _ => Cursor::ByNumber(number),
-            };
+            self.cursor = self.cursor.after(time, number)?;
             let data = row.get_ref(3)?.as_bytes_or_null().ok().flatten();
             let data = data.unwrap_or_default();
             count += 1;
@@ -197,7 +197,7 @@ impl SqliteFile {
     }
 
     /// Goes on in the order of the rows where their order by time cannot be read, and ends where that cannot either.
-    fn broken(&mut self, error: &rusqlite::Error) -> Damage {
+    fn broken(&mut self, error: &ReadError) -> Damage {
         let reason = if let Cursor::ByTime(i64::MIN, _) = self.cursor {
             self.cursor = Cursor::ByNumber(i64::MIN);
             format!(

@@ -91,7 +91,7 @@ impl WriteBehind {
         let (sender, answer) = sync_channel(1);
         self.hand_over()?;
         self.send(Order::Channel(Box::new(topic.clone()), sender))?;
-        answer.recv().or_else(|_| Err(self.failure()))
+        answer.recv().map_err(|_| self.failure())
     }
 
     /// As [`Writer::write`].

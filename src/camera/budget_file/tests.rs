@@ -111,11 +111,11 @@ fn every_slip_is_refused_at_its_line() {
         ("sigmas: {f: 1}\n".to_owned(), "unknown key \"f\""),
         (
             "sigmas:\n  fx: -1\n".to_owned(),
-            "c.yaml:2:7: the sigma of fx must be 0 to 100, got -1",
+            "c.yaml:2:7: the sigma of fx must be 0, or 1e-12 to 100, got -1",
         ),
         (
             "sigmas: {cy: .nan}\n".to_owned(),
-            "the sigma of cy must be 0 to 100, got NaN",
+            "the sigma of cy must be 0, or 1e-12 to 100, got NaN",
         ),
         (
             of("[fx, f]", "[[1]]"),
@@ -132,7 +132,7 @@ fn every_slip_is_refused_at_its_line() {
         ),
         (
             of("[fx, fy]", "[[1, 0], [0, -1]]"),
-            "the sigma of fy must be 0 to 100, got NaN",
+            "the sigma of fy must be 0, or 1e-12 to 100, got NaN",
         ),
         (
             of("[fx, k1]", "[[1, 0.1], [0.2, 1]]"),
@@ -154,5 +154,19 @@ fn every_slip_is_refused_at_its_line() {
     for (text, expected) in slips {
         let found = refusal(&text);
         assert!(found.contains(expected), "{text}: {found}");
+    }
+}
+
+#[test]
+fn sigmas_whose_squares_vanish_are_refused_and_never_become_nan() {
+    for text in [
+        "sigmas: {fx: 1.2, fy: 5e-324}\n",
+        "covariance: {parameters: [fx, fy], data: [[5e-324, 0], [0, 1]]}\n",
+    ] {
+        let error = CalibrationBudget::from_yaml(text, "b.yaml").expect_err("no sigma");
+        assert!(
+            error.to_string().contains("must be 0, or 1e-12 to 100"),
+            "{error}"
+        );
     }
 }

@@ -22,6 +22,8 @@ pub struct LinearFrame {
     pub by_pose: SmallVec<[[f64; 6]; 2 * INLINE]>,
     /// Predicted minus seen, sigmas.
     pub residuals: SmallVec<[f64; 2 * INLINE]>,
+    /// By one sigma of the detection's own noise in u and in v.
+    pub by_noise: SmallVec<[[f64; 2]; 2 * INLINE]>,
     /// By each mode of the budget at one sigma: rows of [`Self::modes`] numbers.
     pub by_mode: SmallVec<[f64; 4 * INLINE]>,
     /// How many modes the budget has: first flex, then calibration and jitter.
@@ -47,6 +49,7 @@ impl LinearFrame {
             ids: SmallVec::new(),
             by_pose: SmallVec::new(),
             residuals: SmallVec::new(),
+            by_noise: SmallVec::new(),
             by_mode: SmallVec::new(),
             modes,
             flex_modes,
@@ -86,6 +89,9 @@ impl LinearFrame {
                     by_turn[(row, 2)],
                 ]);
                 frame.residuals.push(residual[row]);
+                frame
+                    .by_noise
+                    .push([0, 1].map(|axis| scale[(row, axis)] * seen.sigma_px));
             }
             let Some(budget) = budget.filter(|_| modes > 0) else {
                 continue;

@@ -201,6 +201,29 @@ impl ErrorBudget {
             .nth(index)
     }
 
+    /// Returns the share of a mode's sigma that lasts, and for how long, s; `None`: for the whole flight. Jitter is new in
+    /// each frame.
+    ///
+    /// # Inputs
+    /// * `index`: its place, as in [`Self::mode_name`].
+    #[must_use]
+    pub fn mode_lasts(&self, index: usize) -> (f64, Option<f64>) {
+        if let Some(flex) = self.flex.get(index) {
+            return (1.0, flex.time_constant_s);
+        }
+        let Some(mode) = self.image.get(index - self.flex.len()) else {
+            return (0.0, None);
+        };
+        let of_calibration = self.calibration.iter().find(|of| of.name == mode.name);
+        let share = match (of_calibration, mode.terms.as_slice()) {
+            // The jitter of the image may be in it.
+            (Some(of), [(term, sigma)]) => of.change[*term].abs() / sigma.abs(),
+            (Some(_), _) => 1.0,
+            (None, _) => 0.0,
+        };
+        (share, None)
+    }
+
     /// Returns the flex modes.
     #[must_use]
     pub fn flex(&self) -> &[FlexMode] {

@@ -8,7 +8,7 @@ use mcap::records::{ChunkHeader, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::layout::{self, Kind};
-use super::records::{MESSAGE_HEADER, records};
+use super::records::{MESSAGE_HEADER, fits, records};
 
 /// Longest chunk that is read, packed or not: recorders write some MiB, and a damaged length must not fill the memory.
 const LONGEST_CHUNK: usize = 1 << 28;
@@ -52,6 +52,11 @@ impl Block {
             known
         });
         unknown
+    }
+
+    /// Returns how many bytes it takes; the same until it is cleared.
+    pub(super) const fn size(&self) -> usize {
+        self.bytes.len() + self.entries.len() * size_of::<Entry>()
     }
 
     /// Returns the log time of the next message.
@@ -168,6 +173,9 @@ fn run(bytes: &[u8], into: &mut Block) -> Result<(), String> {
 /// Reads a chunk after its checksum, if it has one, was found right.
 fn chunk(record: &[u8], into: &mut Block) -> Result<(), String> {
     let body = record.get(9..).unwrap_or_default();
+    if !fits(op::CHUNK, body) {
+        return Err("its header is damaged".to_owned());
+    }
     let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, body) else {
         return Err("its header is damaged".to_owned());
     };
@@ -196,7 +204,9 @@ fn uncompressed(header: &ChunkHeader, data: &[u8], into: &mut Block) -> Result<(
 fn cut_chunk(record: &[u8], into: &mut Block) {
     let is_compressed = record.get(37..41).is_some_and(|length| length != [0; 4]);
     if is_compressed {
-        let _ = unpack(record, into, options());
+        if fits(op::CHUNK, record.get(9..).unwrap_or_default()) {
+            let _ = unpack(record, into, options());
+        }
         return;
     }
     // Times, length and checksum 28, no compression 4, length 8.

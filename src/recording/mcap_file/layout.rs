@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use mcap::records::{Record, op};
 
 use super::super::damage::Damage;
-use super::records::{MESSAGE_HEADER, RECORD_HEADER, records};
+use super::records::{MESSAGE_HEADER, RECORD_HEADER, fits, records};
 
 /// Longest record other than chunk, message and attachment that is read: definitions are text.
 const LONGEST_DESCRIPTION: u64 = 1 << 24;
@@ -291,6 +291,9 @@ impl Walk<'_> {
         self.file.read_exact(&mut bytes)?;
         self.at = footer;
         for (opcode, body) in records(&bytes).flatten() {
+            if !fits(opcode, body) {
+                continue;
+            }
             let Ok(Record::ChunkIndex(index)) = mcap::parse_record(opcode, body) else {
                 continue;
             };

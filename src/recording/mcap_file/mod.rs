@@ -17,6 +17,10 @@ use super::damage::Damage;
 use super::message::{Definition, RecordedMessage, RecordedTopic};
 use block::{Block, Reader};
 use layout::Layout;
+use records::fits;
+
+/// Most bytes of blocks that are held at a time, which are those that overlap in time.
+const MOST_HELD: usize = 1 << 30;
 
 /// Whether a file begins as MCAP files do.
 pub(super) fn is_mcap(start: &[u8]) -> bool {
@@ -38,6 +42,8 @@ pub(super) struct McapFile {
     next: BinaryHeap<Reverse<(u64, u64, usize)>>,
     damages: VecDeque<Damage>,
     passed: u64,
+    /// Bytes of the blocks in `loaded`.
+    held: usize,
 }
 
 /// Schemas and channels by their numbers.
@@ -52,6 +58,9 @@ impl Descriptions {
     /// Takes a record, if it describes something; the first one of a number counts.
     fn take(&mut self, opcode: u8, body: &[u8]) {
         use mcap::records::Record;
+        if !fits(opcode, body) {
+            return;
+        }
         match mcap::parse_record(opcode, body) {
             Ok(Record::Schema { header, data }) => {
                 self.schemas.entry(header.id).or_insert_with(|| {
@@ -111,6 +120,7 @@ impl McapFile {
             next: BinaryHeap::new(),
             damages: layout.damages.into(),
             passed: 0,
+            held: 0,
         };
         // A complete file mostly describes them again at its end.
         if !layout.is_complete || found.descriptions.channels.is_empty() {
@@ -217,6 +227,22 @@ impl McapFile {
         let Some(first_ns) = found.next_time() else {
             return;
         };
+        if first_ns < block.first_ns {
+            self.damages.push_back(Damage::Late {
+                file: self.name.clone(),
+                at: block.start,
+                early_s: (block.first_ns - first_ns) as f64 * 1e-9,
+            });
+        }
+        let size = found.size();
+        if size > MOST_HELD - self.held {
+            let reason = format!(
+                "the chunks that overlap in time would need more than {MOST_HELD} bytes together"
+            );
+            self.damages.push_back(self.damage(&block, reason));
+            return;
+        }
+        self.held += size;
         let slot = self.loaded.iter().position(Option::is_none);
         let slot = slot.unwrap_or_else(|| {
             self.loaded.push(None);
@@ -239,6 +265,7 @@ impl McapFile {
         if let Some(time) = block.next_time() {
             self.next.push(Reverse((time, start, slot)));
         } else if let Some(read) = self.loaded[slot].take() {
+            self.held -= read.size();
             self.reader.reuse(read);
         }
         Some(message)

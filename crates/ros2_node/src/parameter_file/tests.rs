@@ -171,3 +171,23 @@ fn what_is_no_parameter_file_is_refused() {
         "{missing}"
     );
 }
+
+#[test]
+fn names_that_a_long_one_multiplies_are_refused_with_their_line() {
+    // As long as YAML allows a key.
+    let long = "a".repeat(1000);
+    let names = |count: usize| {
+        let mut text = format!("node:\n  ros__parameters:\n    {long}:\n");
+        for number in 0..count {
+            let line = format!("      b{number}: 1\n");
+            text.push_str(&line);
+        }
+        text
+    };
+    assert_eq!(parsed(&names(15)).expect("few")[0].parameters.len(), 15);
+    let error = parsed(&names(20_000)).expect_err("twenty megabytes of names");
+    assert!(
+        matches!(error, ParameterFileError::LongNames { line: 16_675, .. }),
+        "{error}"
+    );
+}

@@ -3,8 +3,9 @@
 //! One JSON object a line in, one a line out, in order. A line that cannot be read or solved gives an
 //! output line with its outcome and message, and the next is processed.
 
+pub mod input;
 mod levels;
-pub mod lines;
+mod lines;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, IsTerminal, Write};
@@ -21,8 +22,9 @@ use tanker_pose::pipeline::{
 };
 use tanker_pose::target::{MAX_COORDINATE_M, MarkerMap};
 
+use self::input::{InputFrame, InputPoint, not_an_object, reason};
 use self::levels::Levels;
-use self::lines::{InputFrame, InputPoint, OutputFrame, not_an_object, reason};
+use self::lines::OutputFrame;
 use crate::options::{self, CalibrationError, EstimatorOptions, IntegrityOptions, SetupError};
 
 /// Longest line that is read: a frame of ten thousand points.
