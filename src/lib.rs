@@ -6,6 +6,7 @@
 //! ```text
 //! bin, ros            the only layers with files, clocks, threads and ros2-client
 //! replay              a recording answered as the node answers its topics
+//! evaluation          a recording judged: errors, consistency, protection levels, residuals, time
 //! answering           what the node does with a message, wherever it comes from
 //! recording           messages in files: MCAP and bags of rosbag2, and CDR, their bytes
 //! convert, messages   plain types <-> the messages of ROS
@@ -30,6 +31,8 @@ pub mod camera;
 pub mod config;
 pub mod convert;
 pub mod estimation;
+#[cfg(feature = "bags")]
+pub mod evaluation;
 pub mod frames;
 pub mod geometry;
 pub mod integrity;
