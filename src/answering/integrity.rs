@@ -2,9 +2,11 @@
 
 use std::time::Instant;
 
+use super::consumers::Protection;
 use super::diagnostics::Tally;
 use super::output::Output;
 use crate::convert;
+use crate::integrity::{FrameIntegrity, Unavailable};
 use crate::messages::{DiagnosticStatus, Header, Integrity, KeyValue};
 use crate::pipeline::{FrameOutcome, IntegrityState, Pipeline};
 use ros2_node::once::SaidOnce;
@@ -18,6 +20,8 @@ pub struct IntegrityOutput {
     /// Since the last report.
     reason: Option<String>,
     log_gate: SaidOnce<IntegrityState>,
+    track_counts: [u64; IntegrityState::ALL.len()],
+    track_log_gate: SaidOnce<IntegrityState>,
 }
 
 impl IntegrityOutput {
@@ -30,10 +34,12 @@ impl IntegrityOutput {
             frames: 0,
             reason: None,
             log_gate: SaidOnce::default(),
+            track_counts: [0; IntegrityState::ALL.len()],
+            track_log_gate: SaidOnce::default(),
         }
     }
 
-    /// Publishes the protection levels of a frame; returns whether they are available and keep their limits.
+    /// Publishes the protection levels of a frame and of the track; returns which are available and keep their limits.
     pub(super) fn on_outcome(
         &mut self,
         header: &Header,
@@ -41,12 +47,16 @@ impl IntegrityOutput {
         pipeline: &Pipeline,
         tally: &mut Tally,
         now: Instant,
-    ) -> bool {
-        let (Some(monitor), Some(levels)) = (pipeline.integrity(), &outcome.integrity) else {
-            return false;
+    ) -> Protection {
+        let (Some(monitor), Some(levels), Some(of_track)) = (
+            pipeline.integrity(),
+            &outcome.integrity,
+            &outcome.track_integrity,
+        ) else {
+            return Protection::default();
         };
         let mode = |index| pipeline.mode_name(index);
-        let message = convert::integrity(header.clone(), monitor, levels, mode);
+        let message = convert::integrity(header.clone(), monitor, levels, of_track, mode);
         let state = IntegrityState::from(levels);
         self.counts[usize::from(state.number())] += 1;
         self.frames += 1;
@@ -61,8 +71,40 @@ impl IntegrityOutput {
                 log::warn!("the pose is not protected: {}", message.message);
             }
         }
+        let track_state = self.on_track(&message.track_message, of_track, now);
         self.output.publish(message, tally);
-        state == IntegrityState::Available
+        Protection {
+            of_frame: state == IntegrityState::Available,
+            of_track: track_state == IntegrityState::Available,
+        }
+    }
+
+    fn on_track(
+        &mut self,
+        message: &str,
+        levels: &Result<FrameIntegrity, Unavailable>,
+        now: Instant,
+    ) -> IntegrityState {
+        let state = IntegrityState::from(levels);
+        self.track_counts[usize::from(state.number())] += 1;
+        match state {
+            IntegrityState::Available => {
+                if let Some(count) = self.track_log_gate.good() {
+                    log::info!("the track is protected again after {count} frames");
+                }
+            }
+            // There is nothing to protect: the status says why.
+            IntegrityState::None => {}
+            _ => {
+                if self.reason.is_none() {
+                    self.reason = Some(format!("the track: {message}"));
+                }
+                if self.track_log_gate.fault(state, now) {
+                    log::warn!("the track is not protected: {message}");
+                }
+            }
+        }
+        state
     }
 
     /// Forgets what was counted.
@@ -71,13 +113,21 @@ impl IntegrityOutput {
         self.frames = 0;
         self.reason = None;
         self.log_gate = SaidOnce::default();
+        self.track_counts = [0; IntegrityState::ALL.len()];
+        self.track_log_gate = SaidOnce::default();
     }
 
     /// Returns the counts, and the last reason since the last report.
     pub(super) fn diagnostics(&mut self, node: &str) -> DiagnosticStatus {
         let reason = self.reason.take();
         let frames = std::mem::take(&mut self.frames);
-        let values = IntegrityState::ALL.into_iter().zip(self.counts);
+        let of_frames = IntegrityState::ALL.into_iter().zip(self.counts);
+        let of_frames = of_frames.filter(|(state, _)| *state != IntegrityState::None);
+        let of_track = IntegrityState::ALL.into_iter().zip(self.track_counts);
+        let name = |state: IntegrityState| state.name().to_ascii_lowercase();
+        let values = of_frames
+            .map(|(state, count)| (name(state), count))
+            .chain(of_track.map(|(state, count)| (format!("track_{}", name(state)), count)));
         DiagnosticStatus {
             level: if reason.is_some() {
                 DiagnosticStatus::WARN
@@ -92,8 +142,8 @@ impl IntegrityOutput {
             },
             hardware_id: String::new(),
             values: values
-                .map(|(state, count)| KeyValue {
-                    key: state.name().to_ascii_lowercase(),
+                .map(|(key, count)| KeyValue {
+                    key,
                     value: count.to_string(),
                 })
                 .collect(),

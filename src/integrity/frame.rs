@@ -74,6 +74,19 @@ pub enum Unavailable {
     /// The pose cannot be linearised.
     #[error("the points do not determine the pose well enough for protection levels")]
     Singular,
+    /// There is no track.
+    #[error("no track")]
+    NoTrack,
+    /// A frame that has shaped the track has no separations.
+    #[error(
+        "a frame of the track could not be linearised: there are levels again when a track begins anew"
+    )]
+    TrackNotFollowed,
+    /// More hypotheses than are followed.
+    #[error(
+        "the track has more beacons and causes of error than protection levels are computed for"
+    )]
+    TooManyHypotheses,
     /// A fault is visible.
     #[error(
         "{}",

@@ -24,17 +24,23 @@
 //! Electronic Systems* 51(1), 2015; here with pixels for ranges, beacons for satellites, and an error budget in place
 //! of the bias bounds.
 
+mod alone;
+mod declared;
 mod frame;
 mod gaussian;
 mod hypotheses;
 mod level;
 mod monitor;
 mod projection;
+mod search;
 mod separation;
+mod track;
 
+pub use declared::{IntegrityPoint, Mount};
 pub use frame::{AboveLimit, FrameIntegrity, PointIntegrity, Unavailable};
 pub use hypotheses::{Beacon, Hypothesis};
-pub use monitor::{IntegrityMonitor, IntegrityPoint, Mount};
+pub use monitor::IntegrityMonitor;
+pub use track::{FrameSeparations, TrackSeparation, TrackSeparations};
 
 /// Probabilities that protection levels are computed from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +60,18 @@ pub struct IntegritySettings {
     /// Frames over which the probabilities hold: 1, or those of an approach. By the union bound, so it does not matter
     /// how much of their errors they share.
     pub frames: u32,
+}
+
+impl IntegritySettings {
+    /// Returns whether there are pairs, faulty flex modes, and faulty calibrations among the hypotheses.
+    #[must_use]
+    pub fn kinds_of_faults(&self) -> [bool; 3] {
+        [
+            self.pairs,
+            self.flex_fault_probability > 0.0,
+            self.calibration_fault_probability > 0.0,
+        ]
+    }
 }
 
 impl Default for IntegritySettings {

@@ -1,56 +1,28 @@
 //! The one call that turns a solution into protection levels.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point3, RowVector6, Vector3, Vector6};
+use nalgebra::{RowVector6, Vector6};
 use smallvec::SmallVec;
 
 use super::IntegritySettings;
+use super::alone::Alone;
+use super::declared::{IntegrityPoint, Mount, PointAxes};
 use super::frame::{AboveLimit, FrameIntegrity, PointIntegrity, Unavailable, Unmonitored};
 use super::gaussian::tail_inverse;
 use super::hypotheses::{Beacon, Hypothesis, Plan, Unit, units};
 use super::level::{Along, Risk};
 use super::projection::Projection;
+use super::search::{Axis, Frame, Search};
 use super::separation::{Separations, Suspicion};
+use super::track::{FrameSeparations, LeftOut, Linearised};
 use crate::camera::Camera;
 use crate::estimation::{Estimator, LinearFrame, Observation, Refinement, Solution};
-use crate::geometry::{PoseCovariance, skew};
+use crate::geometry::PoseCovariance;
 use crate::target::MarkerMap;
 
 /// Points that must remain without the suspects: three fix up to four poses.
 const LEAST_REMAINING: usize = 4;
-/// rad, 10°; beyond it the error does not follow the covariance.
-const MOST_ATTITUDE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
-/// Sigmas of the attitude without a beacon: farther, a pose without it is another one.
-const MOST_TURN_SIGMAS: f64 = 10.0;
-/// Thickness of a target over its length below which it counts as flat.
-const FLAT: f64 = 0.02;
-/// Share of the risk that is kept for frames in which detections were left out: each choice of them is one more way to
-/// be wrong.
-const SHARE_OF_EXCLUSIONS: f64 = 0.1;
-
 /// Of the variance that the curvature gives: below it, a covariance differs by the step that it was taken before.
 const WIDENED: f64 = 1.02;
-
-/// A point of the tanker whose position is to be protected.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IntegrityPoint {
-    /// Its name, for reports.
-    pub name: String,
-    /// Where it is, tanker frame, m.
-    pub point_in_tanker: Point3<f64>,
-    /// How it deviates from there, covariance in the tanker's axes, m².
-    pub covariance: Matrix3<f64>,
-    /// Largest levels allowed: ahead, lateral, vertical in the receiver, m; `None`: not stated.
-    pub alert_limit_m: Option<[f64; 3]>,
-}
-
-/// How the camera sits in the receiver, whose axes the levels have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mount {
-    /// From the camera's optical axes to x ahead, y left, z up, m.
-    pub receiver_from_camera: Isometry3<f64>,
-    /// Of it, receiver axes, about the camera.
-    pub covariance: PoseCovariance,
-}
 
 /// Computes protection levels of solutions.
 #[derive(Debug, Clone)]
@@ -58,23 +30,6 @@ pub struct IntegrityMonitor {
     settings: IntegritySettings,
     mount: Mount,
     points: Vec<IntegrityPoint>,
-}
-
-/// Everything of one frame that hypotheses are held against.
-struct Frame<'a> {
-    linear: &'a LinearFrame,
-    suspicion: Suspicion<'a>,
-    /// Three for each point.
-    axes: SmallVec<[Axis; 6]>,
-}
-
-/// One axis at one point.
-#[derive(Clone, Copy)]
-struct Axis {
-    /// Standard deviation of the estimate in use, with mount and point, m.
-    sigma_m: f64,
-    /// How much more than its curvature says the estimate may be off, 1 or more.
-    widened: f64,
 }
 
 impl IntegrityMonitor {
@@ -116,6 +71,59 @@ impl IntegrityMonitor {
         observations: &[Observation],
         solution: &Solution,
     ) -> Result<FrameIntegrity, Unavailable> {
+        let mut unwanted = None;
+        self.examine(
+            estimator,
+            map,
+            camera,
+            observations,
+            solution,
+            &mut unwanted,
+        )
+    }
+
+    /// Returns the protection levels of a solution, and what those of a track need of the frame: `None` where it cannot
+    /// be linearised.
+    ///
+    /// # Inputs
+    /// As for [`Self::judge`].
+    pub fn judge_for_track(
+        &self,
+        estimator: &Estimator,
+        map: Option<&MarkerMap>,
+        camera: &Camera,
+        observations: &[Observation],
+        solution: &Solution,
+    ) -> (
+        Result<FrameIntegrity, Unavailable>,
+        Option<FrameSeparations>,
+    ) {
+        let mut separations = Some(FrameSeparations::default());
+        let levels = self.examine(
+            estimator,
+            map,
+            camera,
+            observations,
+            solution,
+            &mut separations,
+        );
+        let is_linearised = |found: &FrameSeparations| found.is_of_frame();
+        (levels, separations.filter(is_linearised))
+    }
+
+    /// Does both.
+    ///
+    /// # Inputs
+    /// * `for_track`: is filled if it is wanted.
+    fn examine(
+        &self,
+        estimator: &Estimator,
+        map: Option<&MarkerMap>,
+        camera: &Camera,
+        observations: &[Observation],
+        solution: &Solution,
+        for_track: &mut Option<FrameSeparations>,
+    ) -> Result<FrameIntegrity, Unavailable> {
         let linear = estimator
             .linearised(camera, observations, solution)
             .ok_or(match estimator.settings().refinement {
@@ -127,34 +135,30 @@ impl IntegrityMonitor {
                 .map_or(Beacon::Marker(id), |tag| Beacon::Tag(tag.id))
         };
         let units = units(&linear.ids, beacon_of);
-        let plan = Plan::new(
-            &self.settings,
-            units.len(),
-            linear.flex_modes,
-            linear.modes - linear.flex_modes,
-        );
-        let allowed = self.allowed(estimator, observations, solution);
-        if plan.beyond >= allowed {
+        let plan = self.plan(units.len(), linear.flex_modes, linear.modes);
+        let left_out = left_out(estimator, observations, solution);
+        let allowed = self.settings.hmi_probability * left_out.share();
+        let is_hopeless = plan.beyond >= allowed;
+        let too_many = || Unavailable::Unmonitored {
+            probability: plan.beyond,
+            allowed,
+            reason: Unmonitored::Several,
+        };
+        if is_hopeless && for_track.is_none() {
             // Before work that grows with the square of the points.
-            return Err(Unavailable::Unmonitored {
-                probability: plan.beyond,
-                allowed,
-                reason: Unmonitored::Several,
-            });
+            return Err(too_many());
         }
         let projection = Projection::new(&linear).ok_or(Unavailable::Singular)?;
         let frame = self
             .frame(&linear, &projection, solution)
             .ok_or(Unavailable::Singular)?;
-        let test = self.settings.false_alert_probability
-            / (2.0
-                * f64::from(self.settings.frames)
-                * (plan.count * frame.axes.len()).max(1) as f64);
         let mut search = Search {
             frame: &frame,
-            quantile: tail_inverse(test),
+            quantile: self.quantile(&plan),
             along: Vec::with_capacity(plan.count * frame.axes.len()),
             hypotheses: Vec::with_capacity(plan.count),
+            modes: SmallVec::new(),
+            is_monitored: Vec::with_capacity(plan.count),
             unmonitorable: 0.0,
             fault: None,
             found: Separations::new(),
@@ -166,6 +170,26 @@ impl IntegrityMonitor {
             solution,
         };
         self.visit(&units, &plan, &alone, &mut search);
+        if let Some(separations) = for_track {
+            let linearised = Linearised {
+                linear: &linear,
+                projection: &projection,
+                suspicion: &frame.suspicion,
+                solution,
+                budget: estimator.budget(),
+            };
+            *separations = FrameSeparations::new(
+                &linearised,
+                &units,
+                plan.has_pairs,
+                &search.modes,
+                &search.is_monitored,
+                left_out,
+            );
+        }
+        if is_hopeless {
+            return Err(too_many());
+        }
         if let Some((_, fault)) = search.fault {
             return Err(fault);
         }
@@ -175,8 +199,41 @@ impl IntegrityMonitor {
             (search.unmonitorable, Unmonitored::TooFewPoints),
             (solution.ambiguity * frames, Unmonitored::SecondPose),
         ];
+        let sigmas: SmallVec<[f64; 6]> = frame.axes.iter().map(|axis| axis.sigma_m).collect();
+        self.levels(allowed, &parts, &sigmas, &search.hypotheses, &search.along)
+    }
+
+    /// Returns the hypotheses about so many beacons and modes, by their number.
+    pub(super) fn plan(&self, beacons: usize, flex_modes: usize, modes: usize) -> Plan {
+        Plan::new(&self.settings, beacons, flex_modes, modes - flex_modes)
+    }
+
+    /// Returns the quantile of the test of one separation.
+    pub(super) fn quantile(&self, plan: &Plan) -> f64 {
+        let axes = 3 * self.points.len();
+        tail_inverse(
+            self.settings.false_alert_probability
+                / (2.0 * f64::from(self.settings.frames) * (plan.count * axes).max(1) as f64),
+        )
+    }
+
+    /// Returns the levels of all points.
+    ///
+    /// # Inputs
+    /// * `allowed`: the risk of all frames.
+    /// * `parts`: probabilities of what is not monitored.
+    /// * `sigmas`: without a fault, of three axes for each point, m.
+    /// * `along`: all axes of the first hypothesis, then those of the next.
+    pub(super) fn levels(
+        &self,
+        allowed: f64,
+        parts: &[(f64, Unmonitored)],
+        sigmas: &[f64],
+        hypotheses: &[Hypothesis],
+        along: &[Along],
+    ) -> Result<FrameIntegrity, Unavailable> {
         let probability: f64 = parts.iter().map(|(part, _)| part).sum();
-        let risk = (allowed - probability) / (3.0 * frames);
+        let risk = (allowed - probability) / (3.0 * f64::from(self.settings.frames));
         if risk <= 0.0 || risk.is_nan() {
             let largest = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0));
             return Err(Unavailable::Unmonitored {
@@ -185,7 +242,7 @@ impl IntegrityMonitor {
                 reason: largest.map_or(Unmonitored::Several, |(_, reason)| *reason),
             });
         }
-        let mut risk = Risk::new(risk, search.hypotheses.len());
+        let mut risk = Risk::new(risk, hypotheses.len());
         let points = (0..self.points.len()).map(|point| {
             let mut found = PointIntegrity {
                 level_m: [0.0; 3],
@@ -194,12 +251,12 @@ impl IntegrityMonitor {
             };
             for axis in 0..3 {
                 let at = 3 * point + axis;
-                let sigma_m = frame.axes[at].sigma_m;
-                let faults = search.along.iter().skip(at).step_by(frame.axes.len());
+                let sigma_m = sigmas[at];
+                let faults = along.iter().skip(at).step_by(sigmas.len());
                 let (level_m, weakest) = risk.protection_level(sigma_m, &faults.copied());
                 found.level_m[axis] = level_m;
                 found.sigma_m[axis] = sigma_m;
-                found.weakest[axis] = weakest.map(|index| search.hypotheses[index]);
+                found.weakest[axis] = weakest.map(|index| hypotheses[index]);
             }
             found
         });
@@ -209,6 +266,15 @@ impl IntegrityMonitor {
             points,
             unmonitored_probability: probability,
         })
+    }
+
+    /// Returns the axes of a point at a pose.
+    pub(super) fn axes_at(
+        &self,
+        point: &IntegrityPoint,
+        pose: &nalgebra::Isometry3<f64>,
+    ) -> PointAxes {
+        PointAxes::new(point, &self.mount, pose)
     }
 
     /// Returns the level that exceeds its limit by the largest factor.
@@ -232,27 +298,6 @@ impl IntegrityMonitor {
             .max_by(|a, b| (a.level_m / a.limit_m).total_cmp(&(b.level_m / b.limit_m)))
     }
 
-    /// Returns the risk of a frame: most of it where nothing was left out.
-    fn allowed(
-        &self,
-        estimator: &Estimator,
-        observations: &[Observation],
-        solution: &Solution,
-    ) -> f64 {
-        let risk = self.settings.hmi_probability;
-        let (most, count) = (estimator.settings().max_outliers, observations.len() as f64);
-        let choices = match most {
-            0 => return risk,
-            1 => count,
-            _ => count + 0.5 * count * (count - 1.0),
-        };
-        if solution.excluded.ids().next().is_none() {
-            risk * (1.0 - SHARE_OF_EXCLUSIONS)
-        } else {
-            risk * SHARE_OF_EXCLUSIONS / choices
-        }
-    }
-
     /// Returns the frame with its directions.
     fn frame<'a>(
         &self,
@@ -262,22 +307,11 @@ impl IntegrityMonitor {
     ) -> Option<Frame<'a>> {
         let mut directions: SmallVec<[Vector6<f64>; 6]> = SmallVec::new();
         let mut axes = SmallVec::new();
-        let pose = &solution.camera_from_tanker;
-        let receiver = self
-            .mount
-            .receiver_from_camera
-            .rotation
-            .to_rotation_matrix();
+        let variance = |row: &RowVector6<f64>, of: &PoseCovariance| (row * of.0).dot(row);
         for point in &self.points {
-            let arm = pose.rotation * point.point_in_tanker.coords;
-            let by_pose = at_point(receiver.matrix(), &arm);
-            let from_mount = receiver * (arm + pose.translation.vector);
-            let by_mount = at_point(&Matrix3::identity(), &from_mount);
-            let turned = receiver.matrix() * pose.rotation.to_rotation_matrix().matrix();
-            let of_point = turned * point.covariance * turned.transpose();
-            let variance = |row: &RowVector6<f64>, of: &PoseCovariance| (row * of.0).dot(row);
+            let at = self.axes_at(point, &solution.camera_from_tanker);
             for axis in 0..3 {
-                let row: RowVector6<f64> = by_pose.row(axis).into_owned();
+                let row: RowVector6<f64> = at.by_pose.row(axis).into_owned();
                 let direction = projection.whitened(&row.transpose())?;
                 let curvature = direction.norm_squared();
                 let stated = variance(&row, &solution.covariance);
@@ -286,10 +320,7 @@ impl IntegrityMonitor {
                 } else {
                     curvature
                 };
-                let mount_row: RowVector6<f64> = by_mount.row(axis).into_owned();
-                let fixed_m2 = variance(&mount_row, &self.mount.covariance).max(0.0)
-                    + of_point[(axis, axis)].max(0.0);
-                let sigma_m = (own + fixed_m2).sqrt();
+                let sigma_m = (own + at.fixed_m2[axis]).sqrt();
                 if !(sigma_m.is_finite() && curvature > 0.0) {
                     return None;
                 }
@@ -343,130 +374,15 @@ impl IntegrityMonitor {
     }
 }
 
-/// Returns the derivative of a point's position by a pose, in turned axes.
-///
-/// # Inputs
-/// * `arm`: from the pose's origin to the point, m.
-fn at_point(axes: &Matrix3<f64>, arm: &Vector3<f64>) -> Matrix3x6<f64> {
-    let mut by_pose = Matrix3x6::zeros();
-    by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(axes);
-    by_pose
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&(axes * -skew(*arm)));
-    by_pose
-}
-
-/// The points of a frame without some of them.
-struct Alone<'a> {
-    estimator: &'a Estimator,
-    camera: &'a Camera,
-    observations: &'a [Observation],
-    solution: &'a Solution,
-}
-
-impl Alone<'_> {
-    /// Returns the used points but those of these rows.
-    fn without<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = &'a Observation> {
-        let used = self.observations.iter();
-        used.filter(|seen| !self.solution.excluded.contains(seen.id))
-            .enumerate()
-            .filter(|(at, _)| !rows.contains(&(2 * at)))
-            .map(|(_, seen)| seen)
-    }
-
-    /// Returns whether the points without these rows have one pose, near the one in use: no second one that they
-    /// allow, where a fault could have led, and an attitude that is known.
-    fn fix_one_pose(&self, rows: &[usize]) -> bool {
-        let others: SmallVec<[Observation; 16]> = self.without(rows).copied().collect();
-        let found = self.estimator.estimate_of_all(self.camera, &others);
-        found.is_ok_and(|found| {
-            let turn = found
-                .camera_from_tanker
-                .rotation
-                .angle_to(&self.solution.camera_from_tanker.rotation);
-            let sigma = found.covariance.largest_attitude_sigma();
-            found.ambiguity <= 0.0 && sigma < MOST_ATTITUDE_SIGMA && turn < MOST_TURN_SIGMAS * sigma
-        })
-    }
-
-    /// Returns whether the points without these rows lie near one plane, so that they allow two poses.
-    fn are_flat(&self, rows: &[usize]) -> bool {
-        let (mut count, mut sum) = (0.0, Vector3::zeros());
-        for seen in self.without(rows) {
-            count += 1.0;
-            sum += seen.marker_in_tanker.coords;
-        }
-        let mean = sum / count;
-        let mut scatter = Matrix3::zeros();
-        for seen in self.without(rows) {
-            let arm = seen.marker_in_tanker.coords - mean;
-            scatter += arm * arm.transpose();
-        }
-        let spread = scatter.symmetric_eigenvalues();
-        let is_deep = spread.min() > FLAT * FLAT * spread.max();
-        !is_deep
-    }
-}
-
-/// What the hypotheses of a frame add up to.
-struct Search<'a> {
-    frame: &'a Frame<'a>,
-    /// Of the test of a separation, in its sigmas.
-    quantile: f64,
-    /// All axes of the first hypothesis, then those of the next.
-    along: Vec<Along>,
-    hypotheses: Vec<Hypothesis>,
-    /// Probability of faults that the points that are left could not show.
-    unmonitorable: f64,
-    /// The worst one that is visible, with its separation over the threshold.
-    fault: Option<(f64, Unavailable)>,
-    found: Separations,
-}
-
-impl Search<'_> {
-    fn rows(&mut self, hypothesis: Hypothesis, prior: f64, rows: &[usize], is_monitored: bool) {
-        let suspicion = &self.frame.suspicion;
-        let is_monitored = is_monitored && suspicion.without_rows(rows, &mut self.found).is_some();
-        self.take(hypothesis, prior, is_monitored);
-    }
-
-    fn mode(&mut self, mode: usize, prior: f64) {
-        let linear = self.frame.linear;
-        let shifts = linear.by_mode.iter().skip(mode).step_by(linear.modes);
-        let shifts: SmallVec<[f64; 32]> = shifts.copied().collect();
-        let suspicion = &self.frame.suspicion;
-        let is_monitored = suspicion.without_mode(&shifts, &mut self.found).is_some();
-        self.take(Hypothesis::Mode(mode), prior, is_monitored);
-    }
-
-    fn take(&mut self, hypothesis: Hypothesis, prior: f64, is_monitored: bool) {
-        if !is_monitored {
-            self.unmonitorable += prior;
-            return;
-        }
-        self.hypotheses.push(hypothesis);
-        for (at, (axis, separation)) in self.frame.axes.iter().zip(&self.found).enumerate() {
-            let threshold_m = self.quantile * separation.sigma_m;
-            let by = separation.difference_m.abs();
-            // Whatever is not a number is no agreement.
-            if by > threshold_m || by.is_nan() || threshold_m.is_nan() {
-                let ratio = by / threshold_m;
-                if self.fault.is_none_or(|(worst, _)| ratio > worst) {
-                    let fault = Unavailable::Fault {
-                        hypothesis,
-                        axis: at % 3,
-                        separation_m: by,
-                        threshold_m,
-                    };
-                    self.fault = Some((ratio, fault));
-                }
-            }
-            let own = separation.sigma_m * axis.widened;
-            self.along.push(Along {
-                prior,
-                threshold_m: threshold_m * axis.widened,
-                sigma_m: axis.sigma_m.hypot(own),
-            });
-        }
+/// Returns what a solution leaves out.
+fn left_out(estimator: &Estimator, observations: &[Observation], solution: &Solution) -> LeftOut {
+    let count = observations.len() as f64;
+    LeftOut {
+        ids: solution.excluded.ids().collect(),
+        choices: match estimator.settings().max_outliers {
+            0 => None,
+            1 => Some(count),
+            _ => Some(count + 0.5 * count * (count - 1.0)),
+        },
     }
 }

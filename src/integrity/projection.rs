@@ -148,6 +148,22 @@ impl Projection {
             .map(|z| dot(&z[self.stride - POSE..], whitened.as_slice()))
     }
 
+    /// Returns `L`.
+    pub(super) fn root(&self) -> &Matrix6<f64> {
+        &self.root
+    }
+
+    /// Returns `P Jᵀ W`, a column for each row: the error of the pose that one sigma of it makes.
+    pub(super) fn levers(&self) -> Vec<Vector6<f64>> {
+        let columns = self.z.chunks_exact(self.stride).map(|z| {
+            let mut column = Vector6::from_column_slice(&z[self.stride - POSE..]);
+            // The root is that of a positive definite matrix.
+            self.root.tr_solve_lower_triangular_mut(&mut column);
+            column
+        });
+        columns.collect()
+    }
+
     /// Returns `M`, row by row.
     pub(super) fn residuals_by_error(&self) -> SmallVec<[f64; MATRIX]> {
         let rows = self.weighted_residuals.len();

@@ -8,6 +8,14 @@ use super::projection::{MATRIX, Projection, dot, factor, forward};
 /// Share of an error that residuals must show: below it, a fault is as good as invisible.
 const LEAST_VISIBLE: f64 = 1e-9;
 
+/// Returns whether residuals show enough of a shift.
+///
+/// # Inputs
+/// * `visible`, `whole`: the square of it in the residuals, and in the pixels.
+pub(super) fn is_visible(visible: f64, whole: f64) -> bool {
+    visible > LEAST_VISIBLE * whole
+}
+
 /// Along one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Separation {
@@ -42,6 +50,21 @@ impl<'a> Suspicion<'a> {
                 .flat_map(|direction| projection.gains(direction))
                 .collect(),
         }
+    }
+
+    /// Returns `M`, row by row.
+    pub(super) fn rows_of_residuals(&self) -> impl Iterator<Item = &[f64]> {
+        self.residuals_by_error.chunks_exact(self.rows())
+    }
+
+    /// Returns a row of `M`.
+    pub(super) fn row_of_residuals(&self, row: usize) -> &[f64] {
+        &self.residuals_by_error[row * self.rows()..][..self.rows()]
+    }
+
+    /// Returns `W r`.
+    pub(super) fn weighted_residuals(&self) -> &[f64] {
+        self.weighted_residuals
     }
 
     fn rows(&self) -> usize {
@@ -90,8 +113,7 @@ impl<'a> Suspicion<'a> {
         let rows = self.residuals_by_error.chunks_exact(self.rows());
         let visible: f64 = rows.zip(shifts).map(|(row, h)| h * dot(row, shifts)).sum();
         let whole = dot(shifts, shifts);
-        let is_visible = visible > LEAST_VISIBLE * whole;
-        if whole > 0.0 && !is_visible {
+        if whole > 0.0 && !is_visible(visible, whole) {
             return None;
         }
         let seen = dot(shifts, self.weighted_residuals);
@@ -129,6 +151,7 @@ mod tests {
             by_pose: (0..12)
                 .map(|row| std::array::from_fn(|column| 3.0 * number(row * 6 + column)))
                 .collect(),
+            by_noise: (0..12).map(|_| [0.0; 2]).collect(),
             residuals: (0..12).map(|row| number(row + 500)).collect(),
             by_mode: (0..24).map(|at| 2.0 * number(at + 700)).collect(),
             modes: 2,

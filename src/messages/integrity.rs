@@ -34,4 +34,12 @@ pub struct Integrity {
     pub unmonitored_probability: f64,
     /// Every declared point.
     pub points: Vec<IntegrityPoint>,
+    /// An [`IntegrityState`](crate::pipeline::IntegrityState) of the track, as its number.
+    pub track_state: u8,
+    /// The reason; empty when available.
+    pub track_message: String,
+    /// Of all faults that are not monitored in the track; NaN without levels.
+    pub track_unmonitored_probability: f64,
+    /// Every declared point, for the track.
+    pub track_points: Vec<IntegrityPoint>,
 }

@@ -3,15 +3,16 @@
 use nalgebra::Isometry3;
 
 use super::belief::Belief;
+use super::follower::Follower;
 use super::frame::{Frame, Measured, check};
 use super::history::{Entry, History, Place};
 use super::lasting::LastingError;
-use super::model::{Noise, predict};
+use super::model::{Noise, Transition, predict};
 use super::outcome::{PredictError, StartReason, TrackOutcome};
 use super::settings::{Checked, CheckedFilterSettings, FilterSettings, FilterSettingsError};
 use super::state::{Refused, State, step};
 use super::track::{Track, seconds};
-use crate::geometry::{Motion, PoseCovariance};
+use crate::geometry::{Matrix12, Motion, PoseCovariance};
 
 /// Turns poses of single frames into a track. It reads no clock, and allocates only until it has room for the frames of
 /// half a second.
@@ -20,14 +21,14 @@ use crate::geometry::{Motion, PoseCovariance};
 /// more than sixty frames are kept since: frames after it are taken again. The track is then the same, bit for bit, as if all frames
 /// had come in order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filter {
+pub struct Filter<F: Follower = ()> {
     settings: FilterSettings,
     checked: Checked,
-    belief: Belief,
-    history: History,
+    belief: Belief<F>,
+    history: History<F>,
 }
 
-impl From<CheckedFilterSettings> for Filter {
+impl<F: Follower> From<CheckedFilterSettings> for Filter<F> {
     /// Returns a filter without a track.
     fn from(settings: CheckedFilterSettings) -> Self {
         Self {
@@ -40,7 +41,7 @@ impl From<CheckedFilterSettings> for Filter {
 }
 
 impl Filter {
-    /// Returns a filter without a track.
+    /// Returns a filter without a track, whose error nothing follows.
     ///
     /// # Errors
     /// [`FilterSettingsError`] names the first setting out of range.
@@ -48,6 +49,40 @@ impl Filter {
         Ok(Self::from(settings.checked()?))
     }
 
+    /// Takes the pose of one frame and returns what became of it.
+    ///
+    /// Frames that contradict the track but agree with each other, as many as make a track, end it and are
+    /// the next one: a motion that outran the gate is not coasted away from.
+    ///
+    /// # Inputs
+    /// * `stamp_ns`: when the image was taken.
+    /// * `camera_from_tanker`, `covariance`: a trusted estimate, whose error is independent of those of
+    ///   other frames.
+    pub fn update(
+        &mut self,
+        stamp_ns: i64,
+        camera_from_tanker: &Isometry3<f64>,
+        covariance: &PoseCovariance,
+    ) -> TrackOutcome {
+        self.update_with_lasting(stamp_ns, camera_from_tanker, covariance, &[])
+    }
+
+    /// Takes the pose of one frame, whose error has parts in common with those of other frames.
+    ///
+    /// # Inputs
+    /// As for [`Self::update_followed`].
+    pub fn update_with_lasting(
+        &mut self,
+        stamp_ns: i64,
+        camera_from_tanker: &Isometry3<f64>,
+        noise: &PoseCovariance,
+        lasting: &[LastingError],
+    ) -> TrackOutcome {
+        self.update_followed(stamp_ns, camera_from_tanker, noise, lasting, ())
+    }
+}
+
+impl<F: Follower> Filter<F> {
     /// Returns the settings in force.
     #[must_use]
     pub fn settings(&self) -> &FilterSettings {
@@ -91,37 +126,23 @@ impl Filter {
         Ok(predict(&state.track().motion, gap_s, noise))
     }
 
-    /// Takes the pose of one frame and returns what became of it.
-    ///
-    /// Frames that contradict the track but agree with each other, as many as make a track, end it and are
-    /// the next one: a motion that outran the gate is not coasted away from.
+    /// Takes the pose of one frame, whose error has parts in common with those of other frames, and what the follower of
+    /// the error needs of it.
     ///
     /// # Inputs
     /// * `stamp_ns`: when the image was taken.
-    /// * `camera_from_tanker`, `covariance`: a trusted estimate, whose error is independent of those of
-    ///   other frames.
-    pub fn update(
-        &mut self,
-        stamp_ns: i64,
-        camera_from_tanker: &Isometry3<f64>,
-        covariance: &PoseCovariance,
-    ) -> TrackOutcome {
-        self.update_with_lasting(stamp_ns, camera_from_tanker, covariance, &[])
-    }
-
-    /// Takes the pose of one frame, whose error has parts in common with those of other frames.
-    ///
-    /// # Inputs
-    /// * `stamp_ns`, `camera_from_tanker`: as for [`Self::update`].
+    /// * `camera_from_tanker`: a trusted estimate.
     /// * `noise`: covariance of the part of the error that is this frame's own.
     /// * `lasting`: the parts that other frames share. The first 58 of a track are carried one by one, others together
     ///   as constant errors of the pose: those with a time constant and the largest come first.
-    pub fn update_with_lasting(
+    /// * `input`: for what follows the error.
+    pub fn update_followed(
         &mut self,
         stamp_ns: i64,
         camera_from_tanker: &Isometry3<f64>,
         noise: &PoseCovariance,
         lasting: &[LastingError],
+        input: F::Input,
     ) -> TrackOutcome {
         if let Err(error) = check(camera_from_tanker, noise, lasting) {
             return TrackOutcome::Invalid(error);
@@ -130,12 +151,23 @@ impl Filter {
             camera_from_tanker: *camera_from_tanker,
             noise: self.with_floor(noise),
         };
-        self.take(stamp_ns, Some(&measured), lasting)
+        self.take(stamp_ns, Some(&measured), lasting, input)
+    }
+
+    /// Returns what follows the track's error, at the last accepted frame, and the transition of errors from there to a
+    /// stamp; `None` where [`Self::predict`] gives nothing.
+    #[must_use]
+    pub fn follower(&self, stamp_ns: i64) -> Option<(&F, Matrix12)> {
+        let state = self.confirmed()?;
+        let gap_s = seconds(stamp_ns, state.motion.stamp_ns);
+        let is_within = (0.0..=self.checked.max_gap_s).contains(&gap_s);
+        let motion = &state.motion.given_causes;
+        is_within.then(|| (&state.follower, Transition::new(motion, gap_s).matrix()))
     }
 
     /// Takes the stamp of a frame that gave no pose, and returns whether the track outlives it.
     pub fn miss(&mut self, stamp_ns: i64) -> TrackOutcome {
-        self.take(stamp_ns, None, &[])
+        self.take(stamp_ns, None, &[], F::Input::default())
     }
 
     /// Puts a frame among the others, by its stamp.
@@ -144,6 +176,7 @@ impl Filter {
         stamp_ns: i64,
         measured: Option<&Measured>,
         lasting: &[LastingError],
+        input: F::Input,
     ) -> TrackOutcome {
         let mut accepted_ns = self.accepted_ns();
         let mut late_by_s = None;
@@ -173,6 +206,7 @@ impl Filter {
         if let Some(entry) = self.history.entry(at) {
             entry.frame.measured = measured.copied();
             entry.frame.lasting.extend_from_slice(lasting);
+            entry.frame.input = input;
         }
         // Out, so that its frames can be read while the belief changes.
         let mut history = std::mem::take(&mut self.history);
@@ -205,7 +239,7 @@ impl Filter {
     }
 
     /// Goes on by one frame, in the order of stamps: makes the belief after it.
-    fn follow(&mut self, before: &Belief, frame: &Frame) -> TrackOutcome {
+    fn follow(&mut self, before: &Belief<F>, frame: &Frame<F::Input>) -> TrackOutcome {
         let stamp_ns = frame.stamp_ns;
         let Some(state) = &before.state else {
             if let Some(measured) = &frame.measured {
@@ -282,7 +316,12 @@ impl Filter {
     }
 
     /// Takes a pose that the gate has refused for the track that such poses may make.
-    fn challenge(&mut self, rival: Option<&State>, frame: &Frame, measured: &Measured) {
+    fn challenge(
+        &mut self,
+        rival: Option<&State<F>>,
+        frame: &Frame<F::Input>,
+        measured: &Measured,
+    ) {
         let challenger = &mut self.belief.challenger;
         if let Some(rival) = rival {
             let gap_s = seconds(frame.stamp_ns, rival.motion.stamp_ns);
@@ -310,12 +349,17 @@ impl Filter {
         self.belief.state.as_ref()?.lasting.column(at)
     }
 
-    fn confirmed(&self) -> Option<&State> {
+    fn confirmed(&self) -> Option<&State<F>> {
         let state = self.belief.state.as_ref()?;
         (state.motion.consistent_frames >= self.checked.confirm_frames).then_some(state)
     }
 
-    fn start(&mut self, frame: &Frame, measured: &Measured, reason: StartReason) -> TrackOutcome {
+    fn start(
+        &mut self,
+        frame: &Frame<F::Input>,
+        measured: &Measured,
+        reason: StartReason,
+    ) -> TrackOutcome {
         self.checked.begin(&mut self.belief.state, frame, measured);
         self.belief.challenger = None;
         TrackOutcome::Started(reason)

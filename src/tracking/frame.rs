@@ -17,11 +17,13 @@ pub(super) struct Measured {
 
 /// What one frame said.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Frame {
+pub(super) struct Frame<I> {
     pub(super) stamp_ns: i64,
     /// `None`: a frame without a pose.
     pub(super) measured: Option<Measured>,
     pub(super) lasting: Vec<LastingError>,
+    /// For what follows the error of the track.
+    pub(super) input: I,
 }
 
 /// Returns nothing when a pose and its errors can be taken.

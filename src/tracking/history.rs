@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::belief::Belief;
+use super::follower::Follower;
 use super::frame::Frame;
 use super::track::seconds;
 
@@ -13,9 +14,9 @@ const MAX_FRAMES: usize = 60;
 
 /// A frame, and what was believed before it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Entry {
-    pub(super) frame: Frame,
-    pub(super) before: Belief,
+pub(super) struct Entry<F: Follower> {
+    pub(super) frame: Frame<F::Input>,
+    pub(super) before: Belief<F>,
 }
 
 /// Where the stamp of a frame stands to those of earlier ones.
@@ -41,15 +42,15 @@ pub(super) enum Place {
 
 /// Frames in the order of their stamps.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct History {
+pub(super) struct History<F: Follower> {
     // Boxes, because inserting moves what follows.
-    entries: VecDeque<Box<Entry>>,
+    entries: VecDeque<Box<Entry<F>>>,
     newest_ns: Option<i64>,
     /// Nothing older than this can be taken, nor of this stamp.
     forgotten_ns: Option<i64>,
 }
 
-impl History {
+impl<F: Follower> History<F> {
     /// Forgets all frames and stamps.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
@@ -124,6 +125,7 @@ impl History {
         entry.frame.stamp_ns = stamp_ns;
         entry.frame.measured = None;
         entry.frame.lasting.clear();
+        entry.frame.input = F::Input::default();
         let at = at.saturating_sub(removed);
         self.entries.insert(at, entry);
         at
@@ -133,7 +135,7 @@ impl History {
         self.entries.len()
     }
 
-    pub(super) fn entry(&mut self, at: usize) -> Option<&mut Entry> {
+    pub(super) fn entry(&mut self, at: usize) -> Option<&mut Entry<F>> {
         self.entries.get_mut(at).map(Box::as_mut)
     }
 }

@@ -1,6 +1,7 @@
 //! The last motion of a filter, which outlives its track; it is used to predict where to look.
 
 use super::Filter;
+use super::follower::Follower;
 use super::model::{Noise, predict};
 use super::track::{Track, seconds};
 use crate::geometry::Motion;
@@ -35,7 +36,7 @@ impl LastMotion {
     }
 }
 
-impl Filter {
+impl<F: Follower> Filter<F> {
     /// Returns the last motion of track or candidate; `None` without either.
     #[must_use]
     pub fn last_motion(&self) -> Option<LastMotion> {

@@ -17,6 +17,7 @@
 
 mod belief;
 mod filter;
+mod follower;
 mod frame;
 mod history;
 mod lag;
@@ -31,6 +32,7 @@ mod symmetric6;
 mod track;
 
 pub use filter::Filter;
+pub use follower::{Follower, Matrix12x6, Step};
 pub use last_motion::LastMotion;
 pub use lasting::LastingError;
 pub use outcome::{MeasurementError, PredictError, StartReason, TrackOutcome};

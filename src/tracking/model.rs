@@ -53,7 +53,7 @@ impl Blocks {
         }
     }
 
-    fn whole(&self) -> Matrix12 {
+    pub(super) fn whole(&self) -> Matrix12 {
         let mut covariance = Matrix12::zeros();
         let mut put = |row, column, block: &Matrix6<f64>| {
             covariance
@@ -141,6 +141,18 @@ impl Transition {
             phi: turn.to_rotation_matrix().into_inner(),
             gamma: left_jacobian(by),
         }
+    }
+
+    /// Returns it as a matrix of errors of the whole motion.
+    pub(super) fn matrix(&self) -> Matrix12 {
+        let mut matrix = Matrix12::identity();
+        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.phi);
+        for axis in 0..3 {
+            matrix[(axis, 6 + axis)] = self.dt_s;
+        }
+        let by_rate = self.gamma * self.dt_s;
+        matrix.fixed_view_mut::<3, 3>(3, 9).copy_from(&by_rate);
+        matrix
     }
 
     /// Returns the error of the pose after the step, from errors of pose, and of velocity and rate, before it.
@@ -232,9 +244,11 @@ pub(super) struct Correction {
 /// A measured pose compared with a prediction.
 pub(super) struct Innovation {
     /// `ν`.
-    difference: Vector6<f64>,
+    pub(super) difference: Vector6<f64>,
     /// `N`.
-    noise: Matrix6<f64>,
+    pub(super) noise: Matrix6<f64>,
+    /// `S`.
+    pub(super) covariance: Matrix6<f64>,
     /// `S⁻¹`.
     inverse: Matrix6<f64>,
     /// The square root of `S⁻¹`, times `ν`: white and of unit variance if the model is right.
@@ -286,6 +300,7 @@ impl Innovation {
         squared.is_finite().then_some(Self {
             difference: difference.by,
             noise,
+            covariance: sum,
             inverse: factor.inverse(),
             whitened,
             squared,

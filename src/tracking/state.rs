@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix6, Vector3};
 
+use super::follower::{Follower, Step};
 use super::frame::{Frame, Measured};
 use super::lag::{Lag, MEMORY_FRAMES};
 use super::lasting::Lasting;
@@ -19,9 +20,10 @@ pub(super) enum Refused {
 
 /// A track, or a candidate for one.
 #[derive(Debug, PartialEq)]
-pub(super) struct State {
+pub(super) struct State<F: Follower> {
     pub(super) motion: StateMotion,
     pub(super) lasting: Lasting,
+    pub(super) follower: F,
 }
 
 /// The part of a state that has one size.
@@ -34,7 +36,7 @@ pub(super) struct StateMotion {
     pub(super) lag: Lag,
 }
 
-impl State {
+impl<F: Follower> State<F> {
     /// Returns the motion with its whole covariance.
     pub(super) fn track(&self) -> Track {
         let mut motion = self.motion.given_causes.motion();
@@ -46,11 +48,12 @@ impl State {
     }
 }
 
-impl Clone for State {
+impl<F: Follower> Clone for State<F> {
     fn clone(&self) -> Self {
         Self {
             motion: self.motion,
             lasting: self.lasting.clone(),
+            follower: self.follower.clone(),
         }
     }
 
@@ -58,6 +61,7 @@ impl Clone for State {
     fn clone_from(&mut self, source: &Self) {
         self.motion = source.motion;
         self.lasting.clone_from(&source.lasting);
+        self.follower.copy_from(&source.follower);
     }
 }
 
@@ -71,10 +75,16 @@ impl Checked {
     }
 
     /// Makes a state the candidate that begins with a frame.
-    pub(super) fn begin(&self, state: &mut Option<State>, frame: &Frame, measured: &Measured) {
-        let mut lasting = state
+    pub(super) fn begin<F: Follower>(
+        &self,
+        state: &mut Option<State<F>>,
+        frame: &Frame<F::Input>,
+        measured: &Measured,
+    ) {
+        let (mut lasting, mut follower) = state
             .take()
-            .map_or_else(Lasting::default, |state| state.lasting);
+            .map_or_else(Default::default, |state| (state.lasting, state.follower));
+        follower.begin(&frame.input);
         let mut covariance = Blocks {
             pose: measured.noise.0 + lasting.start(&frame.lasting),
             cross: Matrix6::zeros(),
@@ -95,7 +105,11 @@ impl Checked {
             consistent_frames: 1,
             lag: Lag::default(),
         };
-        *state = Some(State { motion, lasting });
+        *state = Some(State {
+            motion,
+            lasting,
+            follower,
+        });
     }
 }
 
@@ -103,11 +117,11 @@ impl Checked {
 ///
 /// # Inputs
 /// * `after`: takes what is believed then; without meaning where the pose is refused. Its memory is used again.
-pub(super) fn step(
+pub(super) fn step<F: Follower>(
     checked: &Checked,
-    before: &State,
-    after: &mut Option<State>,
-    frame: &Frame,
+    before: &State<F>,
+    after: &mut Option<State<F>>,
+    frame: &Frame<F::Input>,
     measured: &Measured,
 ) -> Result<f64, Refused> {
     let StateMotion {
@@ -119,6 +133,7 @@ pub(super) fn step(
     let after = after.get_or_insert_with(|| State {
         motion: before.motion,
         lasting: Lasting::default(),
+        follower: F::default(),
     });
     let lasting = &mut after.lasting;
     let gap_s = seconds(frame.stamp_ns, *stamp_ns);
@@ -156,6 +171,16 @@ pub(super) fn step(
         .correct(&predicted, sums.as_ref())
         .ok_or(Refused::LostPrecision)?;
     lasting.correct(&correction);
+    let step = Step {
+        dt_s: gap_s,
+        transition: &transition,
+        difference: &difference,
+        innovation: &innovation,
+        predicted: &predicted,
+        correction: &correction,
+        checked,
+    };
+    after.follower.follow(&before.follower, &step, &frame.input);
     after.motion = StateMotion {
         stamp_ns: frame.stamp_ns,
         given_causes: correction.motion,
