@@ -216,6 +216,8 @@ mod tests {
             track: FrameTrack::default(),
             causes: None,
             integrity: None,
+            track_integrity: None,
+            separations: None,
             widened_by: 1.0,
         };
         let detections = [

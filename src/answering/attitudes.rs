@@ -1,17 +1,16 @@
 //! The attitudes that receiver and tanker have sent, and what they are to each other.
 
-use std::time::Instant;
-
 use nalgebra::{Rotation3, UnitQuaternion};
 
-use crate::config::Configuration;
-use crate::convert;
+use super::contradiction::{Agreement, Contradiction};
+use crate::config::{Configuration, ReportedAttitudeSettings};
+use crate::convert::{self, FlightStackError};
 use crate::frames::{
     AttitudeAt, AttitudeError, AttitudeHistory, RelativeAttitudeError, receiver_from_tanker,
 };
 use crate::messages::{Imu, VehicleAttitude};
+use crate::pipeline::FrameOutcome;
 use crate::refuelling::ExpectedAttitude;
-use ros2_node::once::SaidOnce;
 
 /// One sample, as a flight stack sends it.
 #[derive(Debug)]
@@ -24,27 +23,30 @@ pub enum AttitudeMessage {
 
 /// The samples of one aircraft.
 pub(crate) struct HeardAttitude {
-    of: &'static str,
     history: AttitudeHistory,
     /// PX4's count of corrections by a jump.
     resets: Option<u8>,
-    bad: SaidOnce<()>,
     last_bad: Option<String>,
 }
 
 impl HeardAttitude {
-    fn new(of: &'static str, max_age_s: f64) -> Self {
+    fn new(max_age_s: f64) -> Self {
         Self {
-            of,
             history: AttitudeHistory::new(max_age_s),
             resets: None,
-            bad: SaidOnce::default(),
             last_bad: None,
         }
     }
 
-    /// Takes a sample; says so if it cannot be used.
-    pub(super) fn take(&mut self, message: &AttitudeMessage, px4_minus_ros_us: i64, now: Instant) {
+    /// Takes a sample.
+    ///
+    /// # Errors
+    /// [`FlightStackError`]: it cannot be used, and is not.
+    fn take(
+        &mut self,
+        message: &AttitudeMessage,
+        px4_minus_ros_us: i64,
+    ) -> Result<(), FlightStackError> {
         let sample = match message {
             AttitudeMessage::Px4(message) => {
                 // Across a reset the difference of two samples is no rate.
@@ -57,29 +59,11 @@ impl HeardAttitude {
             }
             AttitudeMessage::Imu(message) => convert::imu_attitude(message),
         };
-        let of = self.of;
         match sample {
-            Ok(sample) => {
-                self.history.push(sample);
-                if let Some(count) = self.bad.good() {
-                    log::info!("the {of}'s attitude is usable again after {count} bad samples");
-                }
-            }
-            Err(error) => {
-                if self.bad.fault((), now) {
-                    log::warn!("ignoring a sample of the {of}'s attitude: {error}");
-                }
-                self.last_bad = Some(error.to_string());
-            }
+            Ok(sample) => self.history.push(sample),
+            Err(error) => self.last_bad = Some(error.to_string()),
         }
-    }
-
-    /// Returns the attitude at a stamp.
-    ///
-    /// # Errors
-    /// [`AttitudeError`] says what is missing.
-    pub(super) fn at(&self, stamp_ns: i64) -> Result<AttitudeAt, AttitudeError> {
-        self.history.at(stamp_ns)
+        sample.map(|_| ())
     }
 
     /// Returns why a sample was not used, if any was not since this was asked last.
@@ -93,20 +77,29 @@ impl HeardAttitude {
 pub(super) enum NoReportedAttitude {
     #[error(transparent)]
     Missing(#[from] RelativeAttitudeError),
+    #[error("{0}: one of them is wrong, or the nominal attitude is")]
+    Unlikely(Contradiction),
+}
+
+/// Why there is no attitude of the receiver to turn outputs to local axes with.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub(crate) enum NoLocalAttitude {
+    #[error(transparent)]
+    Missing(#[from] AttitudeError),
     #[error(
-        "by both attitudes the tanker stands {off_deg:.1}° off its nominal attitude, allowed by max_attitude_deviation_deg is {limit_deg}°: \
-         one of them is wrong, or the nominal attitude is"
+        "it or that of the tanker is wrong, and until both agree with the image again, or ~/reset is called, it is not used: {0}"
     )]
-    Unlikely { off_deg: f64, limit_deg: f64 },
+    Contradicted(Contradiction),
 }
 
 /// The samples of both aircraft.
-pub(super) struct Attitudes {
+pub(crate) struct Attitudes {
     pub(super) receiver: HeardAttitude,
     pub(super) tanker: HeardAttitude,
     px4_minus_ros_us: i64,
-    /// What both reported together has to be near; `None` where it is not used.
-    expected: Option<ExpectedAttitude>,
+    /// What both reported together has to be near, and how well it is known; `None` where it is not used.
+    expected: Option<(ExpectedAttitude, ReportedAttitudeSettings)>,
+    agreement: Agreement,
 }
 
 impl Attitudes {
@@ -114,10 +107,11 @@ impl Attitudes {
     pub(super) fn new(configuration: &Configuration) -> Self {
         let consumers = &configuration.consumers;
         let mut attitudes = Self {
-            receiver: HeardAttitude::new("receiver", consumers.attitude_max_age_s),
-            tanker: HeardAttitude::new("tanker", configuration.tanker_attitude_max_age_s),
+            receiver: HeardAttitude::new(consumers.attitude_max_age_s),
+            tanker: HeardAttitude::new(configuration.tanker_attitude_max_age_s),
             px4_minus_ros_us: consumers.px4_minus_ros_us,
             expected: None,
+            agreement: Agreement::default(),
         };
         attitudes.on_configuration(configuration);
         attitudes
@@ -125,18 +119,64 @@ impl Attitudes {
 
     /// Takes changed parameters: of these only the nominal attitude and the limit can change.
     pub(super) fn on_configuration(&mut self, configuration: &Configuration) {
-        let is_used = configuration.settings.reported_attitude.is_some();
-        self.expected = is_used.then_some(configuration.expected_attitude);
+        self.expected = configuration
+            .settings
+            .reported_attitude
+            .map(|settings| (configuration.expected_attitude, settings));
     }
 
     /// Takes a sample of the receiver's attitude.
-    pub(super) fn on_receiver(&mut self, message: &AttitudeMessage, now: Instant) {
-        self.receiver.take(message, self.px4_minus_ros_us, now);
+    ///
+    /// # Errors
+    /// [`FlightStackError`]: it is not used.
+    pub(super) fn on_receiver(
+        &mut self,
+        message: &AttitudeMessage,
+    ) -> Result<(), FlightStackError> {
+        self.receiver.take(message, self.px4_minus_ros_us)
     }
 
     /// Takes a sample of the tanker's attitude.
-    pub(super) fn on_tanker(&mut self, message: &AttitudeMessage, now: Instant) {
-        self.tanker.take(message, self.px4_minus_ros_us, now);
+    ///
+    /// # Errors
+    /// [`FlightStackError`]: it is not used.
+    pub(super) fn on_tanker(&mut self, message: &AttitudeMessage) -> Result<(), FlightStackError> {
+        self.tanker.take(message, self.px4_minus_ros_us)
+    }
+
+    /// Returns the receiver's attitude at a stamp, for outputs in local axes.
+    ///
+    /// # Errors
+    /// [`NoLocalAttitude`]: it is missing, or it may be the wrong one of two that contradict each other.
+    pub(super) fn of_receiver(&self, stamp_ns: i64) -> Result<AttitudeAt, NoLocalAttitude> {
+        match self.agreement.contradiction() {
+            Some(contradiction) => Err(NoLocalAttitude::Contradicted(contradiction)),
+            None => Ok(self.receiver.history.at(stamp_ns)?),
+        }
+    }
+
+    /// Compares the outcome of a frame with what was reported for it; returns how they contradict each other, if they did
+    /// when both were there last.
+    pub(super) fn compare(
+        &mut self,
+        reported: Option<&Result<Rotation3<f64>, NoReportedAttitude>>,
+        outcome: &FrameOutcome,
+    ) -> Option<Contradiction> {
+        match (reported, &self.expected) {
+            (Some(Ok(reported)), Some((_, settings))) => {
+                self.agreement.judge(reported, settings, outcome);
+            }
+            (Some(Err(NoReportedAttitude::Unlikely(contradiction))), _) => {
+                self.agreement.contradicted(*contradiction);
+            }
+            _ => {}
+        }
+        self.agreement.contradiction()
+    }
+
+    /// Forgets that attitudes contradicted each other.
+    pub(super) const fn on_reset(&mut self) {
+        self.agreement.forget();
     }
 
     /// Returns the tanker's attitude in the receiver at a stamp as both report it; `None` where that is not used.
@@ -148,7 +188,7 @@ impl Attitudes {
         &self,
         stamp_ns: i64,
     ) -> Option<Result<Rotation3<f64>, NoReportedAttitude>> {
-        let expected = self.expected?;
+        let (expected, _) = self.expected?;
         let found = receiver_from_tanker(&self.receiver.history, &self.tanker.history, stamp_ns);
         Some(
             found
@@ -171,7 +211,10 @@ fn near(
     if off_deg <= limit_deg {
         Ok(receiver_from_tanker)
     } else {
-        Err(NoReportedAttitude::Unlikely { off_deg, limit_deg })
+        Err(NoReportedAttitude::Unlikely(Contradiction::Unlikely {
+            off_deg,
+            limit_deg,
+        }))
     }
 }
 
@@ -213,10 +256,11 @@ mod tests {
         left_deg: f64,
     ) -> Option<Result<Rotation3<f64>, NoReportedAttitude>> {
         let mut attitudes = Attitudes::new(&configuration(changes));
-        let now = Instant::now();
         for nanosec in [0, 20_000_000] {
-            attitudes.on_receiver(&imu(nanosec, 30.0), now);
-            attitudes.on_tanker(&imu(nanosec, 30.0 + left_deg), now);
+            let taken = attitudes.on_receiver(&imu(nanosec, 30.0));
+            assert_eq!(taken, Ok(()));
+            let taken = attitudes.on_tanker(&imu(nanosec, 30.0 + left_deg));
+            assert_eq!(taken, Ok(()));
         }
         attitudes.reported(5_010_000_000)
     }
@@ -241,7 +285,7 @@ mod tests {
     fn what_no_tanker_flies_is_not_believed_unless_the_limit_allows_it() {
         let refused = reported(&[SIGMA], 20.0).expect("used");
         assert!(
-            matches!(refused, Err(NoReportedAttitude::Unlikely { off_deg, limit_deg: 15.0 }) if (off_deg - 20.0).abs() < 1e-9),
+            matches!(refused, Err(NoReportedAttitude::Unlikely(Contradiction::Unlikely { off_deg, limit_deg: 15.0 })) if (off_deg - 20.0).abs() < 1e-9),
             "{refused:?}"
         );
         let nominal = ("nominal_yaw_deg", ParameterValue::Double(15.0));

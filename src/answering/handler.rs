@@ -12,6 +12,7 @@ use super::health::Watch;
 use super::input::{InputMessage, InputReader, Sighting};
 use super::monitor::{Answer, Monitor, Subject};
 use super::outputs::Outputs;
+use super::repetition::Repetition;
 use super::topics::{ATTITUDE, CAMERA_INFO, TANKER_ATTITUDE};
 use crate::config::Configuration;
 use crate::convert;
@@ -28,6 +29,7 @@ use ros2_node::once::SaidOnce;
 pub struct Handler {
     pipeline: Pipeline,
     reader: InputReader,
+    repetition: Repetition,
     attitudes: Attitudes,
     outputs: Outputs,
     monitor: Monitor,
@@ -62,9 +64,12 @@ impl Handler {
             names.topic(CAMERA_INFO.name)?,
             clock.now(),
         );
+        let mut repetition = Repetition::default();
+        repetition.allow(configuration.max_frozen_s);
         Ok(Self {
             pipeline,
             reader,
+            repetition,
             attitudes: Attitudes::new(configuration),
             outputs,
             monitor: Monitor::new(names.base_name(), clock.clone(), watch),
@@ -116,11 +121,15 @@ impl Handler {
             ignored_ids,
         } = self.reader.read(message);
         let stamp = Stamp::from(header.stamp);
+        let repeated = detections
+            .as_ref()
+            .ok()
+            .and_then(|seen| self.repetition.take(stamp, &header.frame_id, seen));
         let reported = self.attitudes.reported(stamp.nanoseconds());
         let frame = DetectionFrame {
             stamp,
             frame_id: header.frame_id.clone(),
-            detections,
+            detections: repeated.map_or(detections, Err),
             receiver_from_tanker: reported.and_then(Result::ok),
         };
         let outcome = self.pipeline.process(&frame);
@@ -131,15 +140,17 @@ impl Handler {
         };
         let solve_time = self.clock.now().saturating_duration_since(begin);
         let mut status = convert::status(header.clone(), &outcome, &ignored_ids, solve_time);
-        if let Some(reported) = reported
+        if let Some(reported) = &reported
             && outcome.header_fits()
         {
-            let missing = reported.err();
+            let missing = reported.as_ref().err().copied();
             self.monitor.on_reported_attitude(missing, begin);
             if let Some(missing) = missing {
                 append(&mut status.message, &missing);
             }
         }
+        let contradiction = self.attitudes.compare(reported.as_ref(), &outcome);
+        self.monitor.on_attitudes_compared(contradiction, begin);
         let message = status.message.clone();
         let answer = Answer {
             frame: &frame,
@@ -150,16 +161,18 @@ impl Handler {
         };
         let unexpected = self.monitor.on_answer(&answer);
 
-        let is_protected = self.outputs.integrity.as_mut().is_some_and(|integrity| {
-            let tally = &mut self.monitor.tally;
-            integrity.on_outcome(&header, &outcome, &self.pipeline, tally, begin)
-        });
+        let protection = match &mut self.outputs.integrity {
+            Some(integrity) => {
+                let tally = &mut self.monitor.tally;
+                integrity.on_outcome(&header, &outcome, &self.pipeline, tally, begin)
+            }
+            None => Protection::default(),
+        };
         if let Ok(solution) = &outcome.result {
             self.publish_pose(&header, solution);
             let trust = match unexpected {
                 Some(unexpected) => Err(unexpected.into()),
-                None if is_protected => Ok(Protection::Given),
-                None => Ok(Protection::None),
+                None => Ok(protection),
             };
             self.publish_to_flight_stacks(&header, solution, &outcome, trust);
         }
@@ -177,13 +190,15 @@ impl Handler {
     /// Takes a sample of the receiver's attitude.
     pub fn on_attitude(&mut self, message: &AttitudeMessage) {
         self.monitor.on_decoded(ATTITUDE);
-        self.attitudes.on_receiver(message, self.clock.now());
+        let taken = self.attitudes.on_receiver(message);
+        self.monitor.on_attitude_taken("receiver", taken);
     }
 
     /// Takes a sample of the tanker's attitude.
     pub fn on_tanker_attitude(&mut self, message: &AttitudeMessage) {
         self.monitor.on_decoded(TANKER_ATTITUDE.name);
-        self.attitudes.on_tanker(message, self.clock.now());
+        let taken = self.attitudes.on_tanker(message);
+        self.monitor.on_attitude_taken("tanker", taken);
     }
 
     /// Takes changed parameters, for the next frame on.
@@ -192,6 +207,7 @@ impl Handler {
             consumers.on_configuration(&configuration.consumers);
         }
         self.attitudes.on_configuration(&configuration);
+        self.repetition.allow(configuration.max_frozen_s);
         self.understand(&configuration);
         self.pipeline.set_settings(configuration.settings);
         // Whether the image is rectified decides how the camera info is read.
@@ -208,6 +224,8 @@ impl Handler {
     /// Forgets the track and the last attitude.
     pub fn on_reset(&mut self) {
         self.pipeline.reset();
+        self.attitudes.on_reset();
+        self.repetition.forget();
         self.monitor.on_reset();
     }
 
@@ -276,12 +294,12 @@ impl Handler {
         let corrected = outcome.track.code() == TrackCode::Updated;
         let motion = outcome.track.motion.as_ref().filter(|_| corrected);
         let place = trust.and_then(|protection| {
-            consumers.check(protection)?;
-            Ok((solution, motion))
+            let track = consumers.check(protection, motion)?;
+            Ok((solution, track))
         });
-        let receiver = &self.attitudes.receiver;
+        let attitudes = &self.attitudes;
         let now = self.clock.now();
-        consumers.on_pose(header, place, receiver, &mut self.monitor.tally, now);
+        consumers.on_pose(header, place, attitudes, &mut self.monitor.tally, now);
     }
 
     /// Publishes the track at the frame's stamp, if there is one.

@@ -6,8 +6,10 @@
 //! clock                              the times that all of this reads, of a process or of a recording
 //! output, outputs                    what the node publishes on, opened from the table wherever messages can go
 //! input                              the detections of an image, of one of three types
+//! repetition                         detections that are not those of their image
 //! health, understood, diagnostics    faults around the node, said and shown
 //! attitudes                          what receiver and tanker report of their attitudes
+//! contradiction                      whether these agree with what the camera sees
 //! consumers, integrity               messages for refuelling and flight stacks; protection levels
 //! predicted_points                   where detectors may look in the next image
 //! monitor, handler                   the node's health once a second; one message's work
@@ -19,6 +21,7 @@
 pub mod attitudes;
 pub mod clock;
 pub mod consumers;
+mod contradiction;
 pub mod diagnostics;
 pub mod files;
 pub mod handler;
@@ -29,6 +32,7 @@ mod monitor;
 pub mod output;
 pub mod outputs;
 pub mod predicted_points;
+mod repetition;
 pub mod start;
 pub mod topics;
 mod understood;

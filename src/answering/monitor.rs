@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::attitudes::NoReportedAttitude;
 use super::clock::Clock;
+use super::contradiction::Contradiction;
 use super::diagnostics::{CameraState, Reporter, Situation, Tally};
 use super::health::{
     Fault, ImageAge, Second, SystemClock, Unexpected, Watch, both_clocks, fault_of, seconds_between,
@@ -12,6 +13,7 @@ use super::health::{
 use super::topics::CAMERA_INFO;
 use super::understood::say_understood;
 use crate::config::Configuration;
+use crate::convert::FlightStackError;
 use crate::messages::{DiagnosticArray, Time};
 use crate::pipeline::{DetectionFrame, FrameOutcome, OutcomeCode, Pipeline, Stamp};
 use crate::refuelling::RefuellingGeometry;
@@ -180,6 +182,18 @@ impl Monitor {
     ) {
         let missing = missing.as_ref().map(|missing| missing as &dyn fmt::Display);
         self.watch.on_reported_attitude(missing, now);
+    }
+
+    /// Records whether the attitudes that both aircraft report contradict what is seen.
+    pub(super) fn on_attitudes_compared(&mut self, found: Option<Contradiction>, now: Instant) {
+        let found = found.as_ref().map(|found| found as &dyn fmt::Display);
+        self.watch.on_attitudes_compared(found, now);
+    }
+
+    /// Records whether a sample of an aircraft's attitude can be used.
+    pub(super) fn on_attitude_taken(&mut self, of: &str, taken: Result<(), FlightStackError>) {
+        let error = taken.as_ref().err().map(|error| error as &dyn fmt::Display);
+        self.watch.on_attitude_taken(of, error, self.clock.now());
     }
 
     /// Records how well a frame's residuals agree with what is stated, once it has been answered.

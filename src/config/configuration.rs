@@ -44,6 +44,8 @@ pub struct Configuration {
     pub input: Input,
     /// Most corrected bits of a tag.
     pub max_hamming: i32,
+    /// How long detections may stay the same to the last bit, s; 0: for ever.
+    pub max_frozen_s: f64,
     /// Settings of the outputs for refuelling and flight stacks.
     pub consumers: ConsumerConfiguration,
     /// Farthest that an attitude of the tanker may be from the image, s.
@@ -95,6 +97,7 @@ impl From<&Parameters> for Configuration {
             publish_predicted_points: values.publish_predicted_points,
             input: values.input,
             max_hamming: values.max_hamming,
+            max_frozen_s: values.max_frozen_s,
         }
     }
 }
@@ -303,6 +306,7 @@ mod tests {
             ("publish_predicted_points", Bool(true)),
             ("input", String("apriltags".into())),
             ("max_hamming", Integer(2)),
+            ("max_frozen_s", Double(2.5)),
             ("pixel_sigma_px", Double(0.25)),
             ("edge_margin_px", Double(7.0)),
             ("rectified", Bool(true)),
@@ -344,6 +348,7 @@ mod tests {
         let lasting = CorrelatedNoise::new(0.3, 2.0).expect("in range");
         assert_eq!(found.settings.correlated_noise, Some(lasting));
         assert!(found.use_sim_time && found.lifecycle && found.publish_predicted_points);
+        assert!((found.max_frozen_s - 2.5).abs() < f64::EPSILON);
         assert_eq!((found.input, found.max_hamming), (Input::AprilTags, 2));
         assert!((found.settings.pixel_sigma_px - 0.25).abs() < f64::EPSILON);
         assert!((found.settings.edge_margin_px - 7.0).abs() < f64::EPSILON);

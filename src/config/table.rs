@@ -50,6 +50,9 @@ ros2_node::declare_parameters! {
         /// detections closer than this to the edge of the image are left out, because the edge may cut their beacons
         /// and shift their centroids; use the radius of the largest beacon in the image; 0: none is left out
         edge_margin_px: f64 = double(3.0, [0.0, 1000.0]).unit("px");
+        /// how long the detections may be the same to the last bit in image after image, by their stamps, before camera or
+        /// detector counts as stuck and frames are refused; 0: for ever (a detector of whole pixels on a test bench)
+        max_frozen_s: f64 = double(0.5, [0.0, 60.0]).unit("s");
         /// the detections are pixels of the rectified image: use P of the camera info instead of K and D
         rectified: bool = switch(false);
         /// fewest detections of similar sigma for a pose; with 4, small errors in one detection go unnoticed; with 3,
@@ -160,8 +163,8 @@ ros2_node::declare_parameters! {
         /// publish integrity: how far the tanker may be from where the pose has it, with a probability of error that is
         /// stated, undetected faults of beacons included; needs refinement maximum_likelihood
         publish_integrity: bool = output();
-        /// receptacle and flight-stack outputs are held back unless every alert limit of the refuelling file is kept; needs
-        /// publish_integrity
+        /// receptacle and flight-stack outputs are held back unless every alert limit of the refuelling file is kept, by the
+        /// track too where they carry it; needs publish_integrity
         require_integrity: bool = switch(false).fixed();
         /// probability with which an error may exceed its protection level in one of integrity_frames frames
         hmi_probability: f64 = double(1e-7, [1e-12, 0.01]);

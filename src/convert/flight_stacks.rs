@@ -1,21 +1,23 @@
-//! The receptacle as flight stacks take it, and the receiver's attitude as they send it.
+//! The receptacle as flight stacks take it, and an aircraft's attitude as they send it.
 //!
 //! All start from the receptacle in the receiver's body axes (FLU, about its origin). Local axes are NED here;
 //! attitudes are `NED_from_FRD`.
 
-use nalgebra::{Isometry3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+mod attitudes;
+
+use nalgebra::{Isometry3, Rotation3, Vector3};
+
+pub use attitudes::{imu_attitude, px4_attitude};
 
 use super::tools::pose_message;
 use crate::frames::{
-    AttitudeSample, LocalAttitude, PoseEstimate, TimeError, VarianceError, frd_from_flu,
-    ned_from_enu, px4_us_from_ros_ns, px4_variances, ros_ns_from_px4_us, rotation_only,
+    LocalAttitude, PoseEstimate, TimeError, UprightError, VarianceError, frd_from_flu,
+    ned_from_enu, px4_us_from_ros_ns, px4_variances, rotation_only,
 };
 use crate::geometry::Motion;
 use crate::messages::{
-    FiducialMarkerPosReport, Header, Imu, LandingTarget, LandingTargetPose, PoseStamped,
-    VehicleAttitude,
+    FiducialMarkerPosReport, Header, LandingTarget, LandingTargetPose, PoseStamped,
 };
-use crate::pipeline::Stamp;
 
 /// Why there is no message for a flight stack.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -48,6 +50,16 @@ pub enum FlightStackError {
     /// The message says that it holds no orientation.
     #[error("expected an Imu with an orientation, got orientation_covariance[0] = -1")]
     NoOrientation,
+    /// An attitude that no aircraft in refuelling has.
+    #[error(
+        "expected the rotation {expected}, got another or an aircraft that does not fly the right way up: {reason}"
+    )]
+    Axes {
+        /// The axes that the message is defined with.
+        expected: &'static str,
+        /// What tells.
+        reason: UprightError,
+    },
 }
 
 /// Returns PX4's landing target of the track: receptacle against receiver, NED.
@@ -180,69 +192,8 @@ pub fn mavros_pose(
     Ok(pose_message(header, &turned(&ned_from_enu(), &ned)))
 }
 
-/// Returns stamp (ns of ROS's clock) and `NED_from_FRD` of PX4's message, which holds no rate.
-///
-/// # Errors
-/// [`FlightStackError::Time`], [`FlightStackError::Orientation`].
-pub fn px4_attitude(
-    message: &VehicleAttitude,
-    px4_minus_ros_us: i64,
-) -> Result<AttitudeSample, FlightStackError> {
-    let [w, x, y, z] = message.q.map(f64::from);
-    let stamp_ns = ros_ns_from_px4_us(message.timestamp_sample, px4_minus_ros_us)?;
-    Ok(AttitudeSample {
-        stamp_ns,
-        local_from_body: unit(Quaternion::new(w, x, y, z))?,
-        rate_in_body: None,
-    })
-}
-
-/// Returns stamp (ns), `NED_from_FRD` and the gyro's rate (FRD) of an `Imu` whose orientation is `ENU_from_FLU` and whose
-/// rate is in FLU.
-///
-/// No rate where the message says that it holds none, or zero on all axes: a source that fills in attitudes only leaves it
-/// so, and a gyro never is.
-///
-/// # Errors
-/// [`FlightStackError::NoOrientation`], [`FlightStackError::Orientation`], [`FlightStackError::Rate`].
-pub fn imu_attitude(message: &Imu) -> Result<AttitudeSample, FlightStackError> {
-    // sensor_msgs/Imu: −1 marks it as missing. NaN does not.
-    if message.orientation_covariance[0] < 0.0 {
-        return Err(FlightStackError::NoOrientation);
-    }
-    let q = &message.orientation;
-    let enu_from_flu = unit(Quaternion::new(q.w, q.x, q.y, q.z))?;
-    let axes = |rotation: &Rotation3<f64>| UnitQuaternion::from_rotation_matrix(rotation);
-    let ned_from_frd = axes(&ned_from_enu()) * enu_from_flu * axes(&frd_from_flu());
-    let of_gyro = &message.angular_velocity;
-    let rate_in_flu = Vector3::new(of_gyro.x, of_gyro.y, of_gyro.z);
-    // As for the orientation.
-    let says_none = message.angular_velocity_covariance[0] < 0.0;
-    let is_measured = !says_none && rate_in_flu != Vector3::zeros();
-    if is_measured && !rate_in_flu.iter().all(|rate| rate.is_finite()) {
-        return Err(FlightStackError::Rate {
-            rate_radps: rate_in_flu.into(),
-        });
-    }
-    Ok(AttitudeSample {
-        stamp_ns: Stamp::from(message.header.stamp).nanoseconds(),
-        local_from_body: ned_from_frd,
-        rate_in_body: is_measured.then(|| frd_from_flu() * rate_in_flu),
-    })
-}
-
 fn turned(to_from: &Rotation3<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {
     rotation_only(to_from) * pose
-}
-
-fn unit(q: Quaternion<f64>) -> Result<UnitQuaternion<f64>, FlightStackError> {
-    let norm = q.norm();
-    // ROS's own tolerance for a quaternion that should have length 1.
-    if (norm - 1.0).abs() < 0.01 {
-        Ok(UnitQuaternion::from_quaternion(q))
-    } else {
-        Err(FlightStackError::Orientation { norm })
-    }
 }
 
 #[expect(

@@ -48,6 +48,8 @@ fn frame(result: Result<Solution, Refusal>, doubtful: Option<Solution>) -> Frame
         track: FrameTrack::default(),
         causes: None,
         integrity: None,
+        track_integrity: None,
+        separations: None,
         widened_by: 1.0,
     }
 }

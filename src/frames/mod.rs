@@ -34,6 +34,7 @@ mod motion;
 mod pose;
 mod relative_attitude;
 mod time;
+mod upright;
 mod variance;
 
 pub use attitude::{AttitudeAt, AttitudeError, AttitudeHistory, AttitudeSample};
@@ -41,6 +42,7 @@ pub use axes::{flu_from_optical, frd_from_flu, ned_from_enu, rotation_only};
 pub use pose::{LocalAttitude, PoseEstimate};
 pub use relative_attitude::{RelativeAttitudeError, receiver_from_tanker};
 pub use time::{TimeError, px4_us_from_ros_ns, ros_ns_from_px4_us};
+pub use upright::{UprightError, check_upright};
 pub use variance::{VarianceError, px4_standard_deviations, px4_variances, variances_from};
 
 #[cfg(test)]

@@ -89,6 +89,8 @@ status_codes! {
     AboveLimit = 4 "ABOVE_LIMIT",
     /// The points do not determine the pose well enough for levels.
     NotComputed = 5 "NOT_COMPUTED",
+    /// There is no track; frames do not have this state.
+    None = 6 "NONE",
 }
 
 impl From<&Result<FrameIntegrity, Unavailable>> for IntegrityState {
@@ -97,6 +99,7 @@ impl From<&Result<FrameIntegrity, Unavailable>> for IntegrityState {
             Ok(found) if found.above_limit.is_some() => Self::AboveLimit,
             Ok(_) => Self::Available,
             Err(Unavailable::NoPose) => Self::NoPose,
+            Err(Unavailable::NoTrack) => Self::None,
             Err(Unavailable::Fault { .. }) => Self::Fault,
             Err(Unavailable::Unmonitored { .. }) => Self::Unmonitored,
             Err(_) => Self::NotComputed,

@@ -26,6 +26,7 @@ mod stamp;
 mod suspect_marker;
 mod suspects;
 mod track;
+mod unexplained;
 mod widening;
 mod window;
 
@@ -63,6 +64,7 @@ pub use stamp::Stamp;
 pub use suspect_marker::SuspectMarker;
 use suspects::Suspects;
 use track::Tracker;
+use unexplained::Unexplained;
 use widening::{Sight, Widening};
 
 /// What the latest camera info came to.
@@ -118,6 +120,7 @@ pub struct Pipeline {
     tracker: Tracker,
     predictor: Predictor,
     suspects: Suspects,
+    unexplained: Unexplained,
     sigmas: SigmaWatch,
     widening: Widening,
     setup: Option<RefuellingSetup>,
@@ -133,6 +136,7 @@ impl Pipeline {
             tracker: Tracker::new(settings.track),
             predictor: Predictor::default(),
             suspects: Suspects::default(),
+            unexplained: Unexplained::default(),
             sigmas: SigmaWatch::default(),
             widening: Widening::default(),
             setup: None,
@@ -204,6 +208,12 @@ impl Pipeline {
             // The mount is part of the reported attitude's error.
             self.tracker.reset();
         }
+        if settings.integrity.map(|of| of.kinds_of_faults())
+            != self.settings.integrity.map(|of| of.kinds_of_faults())
+        {
+            // The track has not followed other ones.
+            self.tracker.reset();
+        }
         self.tracker.set_settings(settings.track);
         self.settings = settings;
         self.integrity = monitor(&self.settings, &self.map, self.setup.as_ref());
@@ -226,6 +236,7 @@ impl Pipeline {
     pub fn reset(&mut self) {
         self.previous = None;
         self.suspects.forget();
+        self.unexplained.forget();
         self.sigmas.forget();
         self.widening.forget();
         self.tracker.reset();
@@ -259,7 +270,9 @@ impl Pipeline {
             self.calibration.as_ref(),
         );
         let result = latched.camera.as_ref().map(|_| true).map_err(Clone::clone);
-        self.camera = Some(latched);
+        if self.camera.replace(latched).is_some() {
+            self.unexplained.doubt();
+        }
         if self.calibration.is_some() {
             self.renew_estimator();
         }
@@ -316,12 +329,17 @@ impl Pipeline {
         if self.settings.widen_by_sigma_factor {
             self.watch_scatter(frame.stamp, &outcome);
         }
+        let outcome = self.unexplained.judge(outcome);
         let mut outcome = self.suspects.judge(outcome);
         if self.integrity.is_some() && outcome.result.is_err() {
             outcome.integrity = Some(Err(Unavailable::NoPose));
         }
         let has_causes = self.estimator.has_causes() || self.reported_attitude(frame).is_some();
         self.tracker.follow(frame.stamp, &mut outcome, has_causes);
+        if let Some(monitor) = &self.integrity {
+            let levels = self.tracker.protection(frame.stamp, &outcome, monitor);
+            outcome.track_integrity = Some(levels);
+        }
         self.predictor.follow(frame.stamp, &outcome, &self.tracker);
         if let Ok(solution) = &outcome.result {
             let rotation = solution.camera_from_tanker.rotation.to_rotation_matrix();
@@ -356,7 +374,7 @@ impl Pipeline {
         let mut outcome = solve_expecting(&self.estimator, camera, &observations, &expected);
         outcome.widened_by = widened_by;
         if let (Some(monitor), Ok(solution)) = (&self.integrity, &outcome.result) {
-            let levels = monitor.judge(
+            let (levels, separations) = monitor.judge_for_track(
                 &self.estimator,
                 Some(&self.map),
                 camera,
@@ -364,6 +382,7 @@ impl Pipeline {
                 solution,
             );
             outcome.integrity = Some(levels);
+            outcome.separations = separations.map(Box::new);
         }
         Ok(outcome.without(left_out))
     }

@@ -7,7 +7,7 @@ use crate::estimation::{
     Certificate, EstimateError, EstimatorSettings, FrameCauses, Initialisation, Observation,
     PriorAgreement, Solution,
 };
-use crate::integrity::{FrameIntegrity, Unavailable};
+use crate::integrity::{FrameIntegrity, FrameSeparations, Unavailable};
 
 /// The outcome of one frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,10 @@ pub struct FrameOutcome {
     pub causes: Option<FrameCauses>,
     /// Protection levels, or why there are none; `None` where none are wanted.
     pub integrity: Option<Result<FrameIntegrity, Unavailable>>,
+    /// The same of the track, at the stamp of the frame.
+    pub track_integrity: Option<Result<FrameIntegrity, Unavailable>>,
+    /// What the track's levels need of the frame, until the track has it.
+    pub(crate) separations: Option<Box<FrameSeparations>>,
     /// The factor by which the stated sigmas were multiplied; 1 if they were not.
     pub widened_by: f64,
 }
@@ -51,6 +55,8 @@ impl FrameOutcome {
             track: FrameTrack::default(),
             causes: None,
             integrity: None,
+            track_integrity: None,
+            separations: None,
             widened_by: 1.0,
         }
     }
@@ -83,6 +89,8 @@ impl FrameOutcome {
             track: FrameTrack::default(),
             causes: None,
             integrity: None,
+            track_integrity: None,
+            separations: None,
             widened_by: 1.0,
         }
     }

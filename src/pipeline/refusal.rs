@@ -37,6 +37,19 @@ pub enum Refusal {
     /// The time of the image is missing or malformed.
     #[error("expected the time of the image as a stamp above zero with nanosec below 1e9, got {} s {} ns", .0.sec, .0.nanosec)]
     InvalidStamp(Stamp),
+    /// Other detections with the stamp of the last image.
+    #[error("expected one image for each stamp, got other detections with the stamp of the last ones, {} s {} ns: the source of the stamps is stuck, or two detectors send at once", .0.sec, .0.nanosec)]
+    StampRepeated(Stamp),
+    /// Pixels that do not change.
+    #[error(
+        "expected pixels that change from image to image, got the same ones to the last bit in {images} images over {lasted_s:.1} s: camera or detector is stuck (max_frozen_s)"
+    )]
+    Frozen {
+        /// How many images.
+        images: u32,
+        /// From the first to the last of them, s.
+        lasted_s: f64,
+    },
     /// An id that is not on the marker map.
     #[error("expected ids of the marker map, got unknown id {}", list(ids))]
     UnknownId {
@@ -146,6 +159,12 @@ pub enum Refusal {
         /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
         unclear: Vec<u32>,
     },
+    /// The frame fits only without some of its markers, shortly after frames that no such choice explained.
+    #[error(
+        "the frame fits only without some of its markers, and a frame just before fitted in no way, or the camera has just \
+         changed: expected a frame that fits with all of its markers first; a wrong calibration or marker map?"
+    )]
+    AmongUnexplained,
     /// Image and prior of the attitude contradict each other.
     #[error(
         "expected the attitude near its prior ({prior}), but the image shows it {turn_deg:.1}° off: chi-squared {chi_squared:.2}, limit {limit:.2}; \
@@ -191,7 +210,7 @@ impl Refusal {
             Self::FrameMismatch { .. } | Self::FrameIdTooLong { .. } | Self::OtherImage { .. } => {
                 OutcomeCode::FrameMismatch
             }
-            Self::InvalidStamp(_) => OutcomeCode::ZeroStamp,
+            Self::InvalidStamp(_) | Self::StampRepeated(_) => OutcomeCode::ZeroStamp,
             Self::UnknownId { .. }
             | Self::InvalidId { .. }
             | Self::UnknownTag { .. }
@@ -202,9 +221,11 @@ impl Refusal {
             Self::OutsideImage { .. } => OutcomeCode::OutsideImage,
             Self::Estimate(error) => code_of(error),
             Self::TooUncertain { .. } => OutcomeCode::DegenerateGeometry,
-            Self::NotTrusted { .. } | Self::ContradictsPrior { .. } | Self::SuspectMarker(_) => {
-                OutcomeCode::NotTrusted
-            }
+            Self::NotTrusted { .. }
+            | Self::AmongUnexplained
+            | Self::ContradictsPrior { .. }
+            | Self::SuspectMarker(_)
+            | Self::Frozen { .. } => OutcomeCode::NotTrusted,
             Self::Ambiguous { .. } | Self::NotCertified => OutcomeCode::Ambiguous,
         }
     }

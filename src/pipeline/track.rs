@@ -7,11 +7,12 @@
 use nalgebra::Rotation3;
 
 use super::{FrameErrors, FrameOutcome, Refusal, Stamp};
+use crate::integrity::{FrameIntegrity, IntegrityMonitor, TrackSeparations, Unavailable};
 use crate::tracking::{CheckedFilterSettings, Filter, LastMotion, TrackOutcome};
 
 /// The filter, if tracking is enabled.
 #[derive(Debug)]
-pub(super) struct Tracker(Option<Filter>);
+pub(super) struct Tracker(Option<Filter<TrackSeparations>>);
 
 impl Tracker {
     pub(super) fn new(settings: Option<CheckedFilterSettings>) -> Self {
@@ -57,14 +58,16 @@ impl Tracker {
             return;
         }
         let stamp_ns = stamp.nanoseconds();
+        let separations = frame.separations.take();
         let outcome = match &frame.result {
             Ok(solution) => {
                 let errors = FrameErrors::new(solution, frame.causes.as_ref(), has_causes);
-                filter.update_with_lasting(
+                filter.update_followed(
                     stamp_ns,
                     &solution.camera_from_tanker,
                     &errors.noise,
                     &errors.lasting,
+                    separations.map(|separations| *separations),
                 )
             }
             Err(_) => filter.miss(stamp_ns),
@@ -76,5 +79,19 @@ impl Tracker {
             | TrackOutcome::Late { .. } => None,
             _ => filter.predict(stamp_ns).ok(),
         };
+    }
+    /// Returns the protection levels of the track at a frame's stamp.
+    pub(super) fn protection(
+        &self,
+        stamp: Stamp,
+        frame: &FrameOutcome,
+        monitor: &IntegrityMonitor,
+    ) -> Result<FrameIntegrity, Unavailable> {
+        let motion = frame.track.motion.as_ref().ok_or(Unavailable::NoTrack)?;
+        let filter = self.0.as_ref().ok_or(Unavailable::NoTrack)?;
+        let (followed, transition) = filter
+            .follower(stamp.nanoseconds())
+            .ok_or(Unavailable::NoTrack)?;
+        monitor.judge_track(followed, &transition, motion)
     }
 }

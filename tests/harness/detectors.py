@@ -51,6 +51,8 @@ def box(u: float, v: float, marker: str = "", classes: dict[str, float] | None =
 def boxes(index: int, pixels: Array | None = None) -> Detection2DArray:
     """A box for each of the paper's markers, named by `id`."""
     pixels = paper.marker_pixels(paper.POSE) if pixels is None else pixels
+    # As in messages.feature_points.
+    pixels = np.asarray(pixels) + 1e-9 * (index % 1000)
     return Detection2DArray(
         header=header(index),
         detections=[
@@ -148,7 +150,7 @@ def tags(
     """All tags, seen from `pose`; with noise if there is a generator."""
 
     def see(points: Array) -> Array:
-        pixels = paper.CAMERA.project(pose.transform(points))
+        pixels = paper.CAMERA.project(pose.transform(points)) + 1e-9 * (index % 1000)
         return pixels if rng is None else pixels + rng.normal(0.0, sigma_px, pixels.shape)
 
     detections = []

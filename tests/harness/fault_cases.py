@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
@@ -217,6 +217,23 @@ def report_attitudes(scene: Scene) -> None:
     scene.speak("/mavros/imu/data", "/tanker_attitude")
 
 
+def turn_an_aircraft(topic: str, orientation: Quaternion) -> Callable[[Scene], None]:
+    def provoke(scene: Scene) -> None:
+        both(scene)
+        report_attitudes(scene)
+        good = Scene.message
+
+        def message(of: str) -> object:
+            told = good(scene, of)
+            if of == topic:
+                told.orientation = orientation
+            return told
+
+        scene.message = message
+
+    return provoke
+
+
 # Of the receiver and of the tanker, which comes with every step.
 REPORTED = (
     *("-p", "attitude:=imu", "-p", "reported_attitude_sigma_deg:=2.0"),
@@ -356,6 +373,22 @@ CASES = {
         "the receiver's attitude: need 2 samples of the attitude, got 0",
         both,
         report_attitudes,
+        REPORTED,
+    ),
+    "receiver that would fly on its back": Case(
+        "unusable_attitude",
+        "samples of the receiver's attitude are not used: expected the rotation from FLU",
+        turn_an_aircraft("/mavros/imu/data", Quaternion(x=1.0, w=0.0)),
+        send_good,
+        REPORTED,
+    ),
+    "attitudes that contradict the image": Case(
+        "attitude_contradiction",
+        "one of the attitudes that both aircraft report is wrong: by both attitudes the tanker stands 60.0°",
+        turn_an_aircraft(
+            "/tanker_attitude", Quaternion(z=float(np.sin(np.pi / 6)), w=float(np.cos(np.pi / 6)))
+        ),
+        send_good,
         REPORTED,
     ),
 }

@@ -58,6 +58,8 @@ def feature_points(
     frame_id: str = CAMERA_FRAME,
 ) -> FeaturePointArray:
     """One image's detections, stamped with `stamp_of(index)`."""
+    # No detector that works sees the same to the last bit in image after image, and none that does is believed.
+    pixels = np.asarray(pixels) + 1e-9 * (index % 1000)
     sigmas = np.broadcast_to(np.asarray(sigmas_px, dtype=float), len(pixels))
     return FeaturePointArray(
         header=Header(stamp=stamp_of(index), frame_id=frame_id),

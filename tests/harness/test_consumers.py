@@ -282,7 +282,7 @@ def test_an_attitude_that_is_none_is_not_used(
     flight._attitudes.publish(spoilt)
 
     peer.spin_until(
-        lambda: "ignoring a sample of the receiver's attitude" in flight.estimator.process.log,
+        lambda: "samples of the receiver's attitude are not used" in flight.estimator.process.log,
         "the warning of a quaternion that is none",
     )
     assert "length 0" in flight.estimator.process.log

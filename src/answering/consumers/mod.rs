@@ -11,7 +11,7 @@ mod silence;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::answering::attitudes::HeardAttitude;
+use crate::answering::attitudes::{Attitudes, HeardAttitude};
 use crate::answering::diagnostics::Tally;
 use crate::answering::output::Sinks;
 use crate::answering::topics;
@@ -74,13 +74,13 @@ pub fn refuelling_setup(
     Ok(Some(setup))
 }
 
-/// Whether protection levels of a frame are available and keep their limits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Protection {
-    /// They are.
-    Given,
-    /// They are not, or are not computed.
-    None,
+/// Whether protection levels are available and keep their limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Protection {
+    /// Those of the frame.
+    pub(crate) of_frame: bool,
+    /// Those of the track at its stamp.
+    pub(crate) of_track: bool,
 }
 
 /// The outputs that are on.
@@ -156,21 +156,31 @@ impl Consumers {
         &self.geometry
     }
 
-    /// Returns nothing where outputs may be published with this protection.
-    pub(crate) fn check(&self, protection: Protection) -> Result<(), Silence> {
-        match protection {
-            Protection::None if self.configuration.require_integrity => Err(Silence::NotProtected),
-            Protection::None | Protection::Given => Ok(()),
+    /// Returns the track where outputs may be published with this protection; what carries single frames does not need
+    /// it.
+    pub(crate) fn check<'a>(
+        &self,
+        protection: Protection,
+        track: Option<&'a Motion>,
+    ) -> Result<Result<&'a Motion, Silence>, Silence> {
+        let is_required = self.configuration.require_integrity;
+        if is_required && !protection.of_frame {
+            return Err(Silence::NotProtected);
         }
+        Ok(match track {
+            None => Err(Silence::NoTrack),
+            Some(_) if is_required && !protection.of_track => Err(Silence::TrackNotProtected),
+            Some(track) => Ok(track),
+        })
     }
 
-    /// Publishes what follows from a frame's trusted pose, and from the track at its stamp if the frame has corrected
-    /// one; or nothing, while the tanker's attitude shows that they would be misread.
+    /// Publishes what follows from a frame's trusted pose, and from the track at its stamp as [`Self::check`] has it; or
+    /// nothing, while the tanker's attitude shows that they would be misread.
     pub(crate) fn on_pose(
         &mut self,
         header: &Header,
-        place: Result<(&Solution, Option<&Motion>), Silence>,
-        receiver: &HeardAttitude,
+        place: Result<(&Solution, Result<&Motion, Silence>), Silence>,
+        attitudes: &Attitudes,
         tally: &mut Tally,
         now: Instant,
     ) {
@@ -183,12 +193,12 @@ impl Consumers {
                     stamp: header.stamp,
                     stamp_ns,
                     receiver: &self.configuration.receiver_frame_id,
-                    camera_from_tanker: camera_from_tanker.ok_or(Silence::NoTrack),
+                    camera_from_tanker,
                     target: self.geometry.receptacle_pose(&PoseEstimate {
                         b_from_a: solution.camera_from_tanker,
                         covariance: solution.covariance,
                     }),
-                    attitude: self.attitude_at(receiver, stamp_ns),
+                    attitude: self.attitude_at(attitudes, stamp_ns),
                     px4_minus_ros_us: self.configuration.px4_minus_ros_us,
                 })
             }
@@ -231,12 +241,8 @@ impl Consumers {
         }
     }
 
-    fn attitude_at(
-        &self,
-        receiver: &HeardAttitude,
-        stamp_ns: i64,
-    ) -> Result<LocalAttitude, Silence> {
-        let found = receiver.at(stamp_ns)?;
+    fn attitude_at(&self, attitudes: &Attitudes, stamp_ns: i64) -> Result<LocalAttitude, Silence> {
+        let found = attitudes.of_receiver(stamp_ns)?;
         Ok(LocalAttitude {
             local_from_b: found.local_from_body,
             covariance: self.configuration.attitude_covariance,

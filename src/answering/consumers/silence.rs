@@ -1,14 +1,14 @@
 //! Why an output is held back.
 
+use crate::answering::attitudes::NoLocalAttitude;
 use crate::answering::health::Unexpected;
 use crate::convert::FlightStackError;
-use crate::frames::AttitudeError;
 
 /// Why an output is held back for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(crate) enum Silence {
     #[error("the receiver's attitude: {0}")]
-    Attitude(#[from] AttitudeError),
+    Attitude(#[from] NoLocalAttitude),
     #[error(transparent)]
     FlightStack(#[from] FlightStackError),
     #[error(
@@ -21,6 +21,10 @@ pub(crate) enum Silence {
     UnexpectedAttitude(Unexpected),
     #[error("protection levels are not available, or exceed an alert limit: see integrity")]
     NotProtected,
+    #[error(
+        "the track has no protection levels, or they exceed an alert limit: see track_message of integrity"
+    )]
+    TrackNotProtected,
 }
 
 impl From<Unexpected> for Silence {

@@ -30,6 +30,10 @@ pub enum Fault {
     UnexpectedAttitude,
     /// Frames have no prior from the attitudes that both aircraft report.
     NoReportedAttitude,
+    /// These attitudes contradict what is seen.
+    AttitudeContradiction,
+    /// Samples of an aircraft's attitude cannot be used.
+    UnusableAttitude,
     /// Images are from the future, or from long ago.
     ClockOffset,
     /// Stamps of detections jump back, or far ahead.
@@ -55,7 +59,7 @@ const OVER: Duration = Duration::from_secs(1);
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 21] = [
         Self::IncompatibleQos,
         Self::WrongType,
         Self::SilentPublisher,
@@ -68,6 +72,8 @@ impl Fault {
         Self::Sigma,
         Self::UnexpectedAttitude,
         Self::NoReportedAttitude,
+        Self::AttitudeContradiction,
+        Self::UnusableAttitude,
         Self::ClockOffset,
         Self::StampJump,
         Self::ClockJump,
@@ -93,6 +99,8 @@ impl Fault {
             Self::Sigma => "sigma",
             Self::UnexpectedAttitude => "unexpected_attitude",
             Self::NoReportedAttitude => "no_reported_attitude",
+            Self::AttitudeContradiction => "attitude_contradiction",
+            Self::UnusableAttitude => "unusable_attitude",
             Self::ClockOffset => "clock_offset",
             Self::StampJump => "stamp_jump",
             Self::ClockJump => "clock_jump",
@@ -113,6 +121,8 @@ impl Fault {
             | Self::NotTrusted
             | Self::Sigma
             | Self::NoReportedAttitude
+            | Self::AttitudeContradiction
+            | Self::UnusableAttitude
             | Self::ClockOffset
             | Self::Undecodable => SHOWN_BY_FRAMES,
             // Looked for every second.

@@ -248,6 +248,31 @@ impl Watch {
         }
     }
 
+    /// Records whether the attitudes that both aircraft report contradict what is seen, or each other.
+    pub fn on_attitudes_compared(&mut self, found: Option<&dyn fmt::Display>, now: Instant) {
+        match found {
+            Some(found) => {
+                let words =
+                    format!("one of the attitudes that both aircraft report is wrong: {found}");
+                let doing = "; outputs in local axes are held back until both agree with the image again, or ~/reset is called";
+                self.faults
+                    .see_while(Fault::AttitudeContradiction, "", &words, doing, now);
+            }
+            None => self.faults.end(Fault::AttitudeContradiction),
+        }
+    }
+
+    /// Records a sample of the attitude of an aircraft, and why it is not used, if it is not.
+    pub fn on_attitude_taken(&mut self, of: &str, error: Option<&dyn fmt::Display>, now: Instant) {
+        match error {
+            Some(error) => {
+                let words = format!("samples of the {of}'s attitude are not used: {error}");
+                self.faults.see_of(Fault::UnusableAttitude, of, &words, now);
+            }
+            None => self.faults.end_of(Fault::UnusableAttitude, of),
+        }
+    }
+
     /// Records a refusal that reveals a fault around the node.
     pub fn on_refusal(&mut self, fault: Fault, words: &str, now: Instant) {
         if fault == Fault::NoCameraInfo {

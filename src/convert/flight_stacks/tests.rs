@@ -1,10 +1,10 @@
 //! Each message against the scene that it tells of: a receiver that flies north-east in a climb.
 
-use nalgebra::{Matrix3, Matrix6, Translation3};
+use nalgebra::{Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion};
 
 use super::*;
 use crate::geometry::{Matrix12, PoseCovariance};
-use crate::messages::{Time, Vector3 as Vector3Message};
+use crate::messages::{Imu, Time, Vector3 as Vector3Message, VehicleAttitude};
 
 /// Of single precision at twenty metres, m.
 const SINGLE_M: f64 = 4e-6;
@@ -171,6 +171,74 @@ fn the_gyros_rate_is_turned_to_frd_and_none_is_made_up() {
         imu_attitude(&imu),
         Err(FlightStackError::Rate { .. })
     ));
+}
+
+/// Level, nose to the east, in PX4's message.
+fn level() -> VehicleAttitude {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    VehicleAttitude {
+        timestamp: 1,
+        timestamp_sample: 5_000_000,
+        q: [half, 0.0, 0.0, half],
+        ..VehicleAttitude::default()
+    }
+}
+
+#[test]
+fn px4s_attitude_in_other_axes_on_one_side_is_an_error_that_names_the_right_ones() {
+    let [w, x, y, z] = level().q;
+    let q = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f32::consts::PI);
+    let to_ned = UnitQuaternion::from_rotation_matrix(&ned_from_enu().cast::<f32>());
+    // NED from FLU, and ENU from FRD.
+    for other in [q * half_turn, to_ned * q] {
+        let told = VehicleAttitude {
+            q: [other.w, other.i, other.j, other.k],
+            ..level()
+        };
+        let error = px4_attitude(&told, 0).expect_err("on its back").to_string();
+        assert!(
+            error.contains("from FRD (x forward, y right, z down) to NED")
+                && error.contains("tilted by 180° from level"),
+            "{error}"
+        );
+    }
+    assert!(px4_attitude(&level(), 0).is_ok());
+}
+
+#[test]
+fn an_imu_in_other_axes_is_an_error_on_one_side_always_and_on_both_by_its_accelerometer() {
+    // East of a level nose in FLU and ENU; a half turn about x exchanges FLU and FRD.
+    let imu = Imu {
+        orientation: crate::messages::Quaternion {
+            x: 1.0,
+            y: 0.0,
+            z: 0.0,
+            w: 0.0,
+        },
+        ..Imu::default()
+    };
+    let error = imu_attitude(&imu).expect_err("on its back").to_string();
+    assert!(
+        error.contains("from FLU (x forward, y left, z up) to ENU"),
+        "{error}"
+    );
+    let mut imu = Imu::default();
+    imu.linear_acceleration.z = 9.8;
+    assert!(imu_attitude(&imu).is_ok());
+    imu.linear_acceleration.z = -9.8;
+    assert!(matches!(
+        imu_attitude(&imu),
+        Err(FlightStackError::Axes { .. })
+    ));
+    imu.linear_acceleration_covariance[0] = -1.0;
+    assert!(
+        imu_attitude(&imu).is_ok(),
+        "the message says that it has none"
+    );
+    imu.linear_acceleration_covariance[0] = 0.0;
+    imu.linear_acceleration.z = f64::NAN;
+    assert!(imu_attitude(&imu).is_ok(), "nothing is made of it");
 }
 
 #[test]

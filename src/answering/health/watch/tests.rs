@@ -139,3 +139,36 @@ fn refusals_for_the_surroundings_last_until_they_are_answered() {
     scene.watch.on_image(Time { sec: 7, nanosec: 0 }, scene.now);
     assert_eq!(scene.pass(1, true, true), []);
 }
+
+#[test]
+fn attitudes_that_cannot_be_used_are_a_fault_of_each_aircraft_and_end_with_good_samples() {
+    let mut scene = Scene::new();
+    for of in ["receiver", "tanker"] {
+        let error: Option<&dyn fmt::Display> = Some(&"on its back");
+        scene.watch.on_attitude_taken(of, error, scene.now);
+    }
+    let both = [Fault::UnusableAttitude, Fault::UnusableAttitude];
+    assert_eq!(scene.pass(1, false, false), both);
+    scene.watch.on_attitude_taken("tanker", None, scene.now);
+    assert_eq!(scene.pass(2, false, false), [Fault::UnusableAttitude]);
+    let (_, words) = scene.watch.faults.iter().next().expect("one is left");
+    assert_eq!(
+        words,
+        "samples of the receiver's attitude are not used: on its back"
+    );
+}
+
+#[test]
+fn contradiction_of_attitudes_is_a_fault_until_they_agree_that_names_what_is_held_back() {
+    let mut scene = Scene::new();
+    let found: Option<&dyn fmt::Display> = Some(&"60° apart");
+    scene.watch.on_attitudes_compared(found, scene.now);
+    assert_eq!(scene.pass(1, false, false), [Fault::AttitudeContradiction]);
+    let (_, words) = scene.watch.faults.iter().next().expect("a fault");
+    assert!(
+        words.contains("60° apart; outputs in local axes are held back"),
+        "{words}"
+    );
+    scene.watch.on_attitudes_compared(None, scene.now);
+    assert_eq!(scene.pass(2, false, false), []);
+}

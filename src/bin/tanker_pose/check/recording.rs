@@ -10,7 +10,7 @@ use tanker_pose::camera::{Camera, CameraInfo};
 use tanker_pose::estimation::Observation;
 use tanker_pose::pipeline::{Detection, ImageEdges, observe};
 
-use crate::solve::lines::{InputFrame, InputPoint};
+use crate::solve::input::{InputFrame, InputPoint};
 use crate::solve::{MAX_LINE_BYTES, SolveError, read_line};
 
 /// Frames that are looked at, evenly taken from the recording.
@@ -141,7 +141,7 @@ fn frame(
     known: &mut Option<Rc<Sight>>,
 ) -> Result<Frame, String> {
     let frame: InputFrame =
-        serde_json::from_slice(line).map_err(|error| crate::solve::lines::reason(&error))?;
+        serde_json::from_slice(line).map_err(|error| crate::solve::input::reason(&error))?;
     let info = match (&frame.camera, calibration) {
         (Some(camera), _) => camera.info()?,
         (None, Some(calibration)) => calibration.clone(),
