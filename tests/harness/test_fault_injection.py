@@ -45,11 +45,11 @@ class Input:
 
 def see_boxes(index: int, rng: np.random.Generator) -> Any:
     pixels = paper.marker_pixels(truth(index))
-    return detectors.boxes(index, pixels + rng.normal(0.0, 0.5, pixels.shape))
+    return detectors.boxes(index, pixels + rng.normal(0.0, 0.3, pixels.shape))
 
 
 def see_tags(index: int, rng: np.random.Generator) -> Any:
-    return detectors.tags(index, truth(index), rng)
+    return detectors.tags(index, truth(index), rng, sigma_px=0.3)
 
 
 INPUTS = [
