@@ -83,6 +83,24 @@ pub(crate) struct Protection {
     pub(crate) of_track: bool,
 }
 
+impl Protection {
+    /// Returns the track where it may be published, or why it may not; or why nothing may.
+    fn permits<T>(
+        self,
+        is_required: bool,
+        track: Option<T>,
+    ) -> Result<Result<T, Silence>, Silence> {
+        if is_required && !self.of_frame {
+            return Err(Silence::NotProtected);
+        }
+        Ok(match track {
+            None => Err(Silence::NoTrack),
+            Some(_) if is_required && !self.of_track => Err(Silence::TrackNotProtected),
+            Some(track) => Ok(track),
+        })
+    }
+}
+
 /// The outputs that are on.
 pub struct Consumers {
     setup: RefuellingSetup,
@@ -163,15 +181,7 @@ impl Consumers {
         protection: Protection,
         track: Option<&'a Motion>,
     ) -> Result<Result<&'a Motion, Silence>, Silence> {
-        let is_required = self.configuration.require_integrity;
-        if is_required && !protection.of_frame {
-            return Err(Silence::NotProtected);
-        }
-        Ok(match track {
-            None => Err(Silence::NoTrack),
-            Some(_) if is_required && !protection.of_track => Err(Silence::TrackNotProtected),
-            Some(track) => Ok(track),
-        })
+        protection.permits(self.configuration.require_integrity, track)
     }
 
     /// Publishes what follows from a frame's trusted pose, and from the track at its stamp as [`Self::check`] has it; or
@@ -249,5 +259,47 @@ impl Consumers {
             rate_in_b: found.rate_in_body,
             rate_covariance: self.configuration.attitude_rate_covariance,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME_ONLY: Protection = Protection {
+        of_frame: true,
+        of_track: false,
+    };
+    const BOTH: Protection = Protection {
+        of_frame: true,
+        of_track: true,
+    };
+    const TRACK_ONLY: Protection = Protection {
+        of_frame: false,
+        of_track: true,
+    };
+
+    #[test]
+    fn track_is_held_back_without_levels_of_its_own_and_all_without_those_of_the_frame() {
+        let track = Some("track");
+        assert!(matches!(BOTH.permits(true, track), Ok(Ok("track"))));
+        let held = FRAME_ONLY.permits(true, track);
+        assert!(
+            matches!(held, Ok(Err(Silence::TrackNotProtected))),
+            "{held:?}"
+        );
+        let held = TRACK_ONLY.permits(true, track);
+        assert!(matches!(held, Err(Silence::NotProtected)), "{held:?}");
+    }
+
+    #[test]
+    fn levels_that_are_not_required_hold_nothing_back() {
+        let none = Protection::default();
+        assert!(matches!(
+            none.permits(false, Some("track")),
+            Ok(Ok("track"))
+        ));
+        let missing = none.permits(false, None::<&str>);
+        assert!(matches!(missing, Ok(Err(Silence::NoTrack))), "{missing:?}");
     }
 }
