@@ -205,7 +205,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    fn least_eigenvalue(matrix: DMatrix<f64>) -> f64 {
+    fn least_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
         matrix.symmetric_eigenvalues().min()
     }
 
@@ -238,7 +238,7 @@ mod tests {
             for modes in [0, 1, 4, 12] {
                 let statement = dominate(&covariance, modes);
                 let excess = statement.covariance() - &covariance;
-                let least = least_eigenvalue(excess);
+                let least = least_eigenvalue(&excess);
                 assert!(least > -1e-12, "seed {seed}, {modes} modes: {least}");
                 assert!(statement.modes.len() <= modes);
             }
@@ -284,7 +284,7 @@ mod tests {
             let mut blocks = DMatrix::zeros(12, 12);
             blocks.view_mut((0, 0), (9, 9)).copy_from(&a);
             blocks.view_mut((9, 9), (3, 3)).copy_from(&c);
-            let least = least_eigenvalue(blocks - &joint);
+            let least = least_eigenvalue(&(blocks - &joint));
             assert!(least > -1e-10, "seed {seed}: {least}");
         }
     }

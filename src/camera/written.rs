@@ -18,7 +18,7 @@ impl CameraInfo {
     #[must_use]
     pub fn with_change(&self, camera: &Camera, change: &CalibrationChange) -> Self {
         let mut info = self.clone();
-        let was_same = [0, 2, 4, 5].map(|k| self.k[k] == self.p[k + k / 3]);
+        let was_same = [0, 2, 4, 5].map(|k| self.k[k].to_bits() == self.p[k + k / 3].to_bits());
         info.k[0] *= change[0].exp();
         info.k[4] *= change[1].exp();
         // The image of the detections may be binned.
@@ -52,12 +52,12 @@ impl CameraInfo {
             }
             if !matches!(camera.lens, Some(Lens::Equidistant(_))) {
                 let is_short = info.d.len() <= 5;
-                info.distortion_model = if is_short {
+                let model = if is_short {
                     "plumb_bob"
                 } else {
                     "rational_polynomial"
-                }
-                .to_owned();
+                };
+                model.clone_into(&mut info.distortion_model);
             }
         }
         info

@@ -192,10 +192,7 @@ impl<'a> Reading<'a> {
             .pipeline
             .camera_for(frame.stamp, &frame.frame_id)
             .map_err(words)?;
-        let detections = frame
-            .detections
-            .as_ref()
-            .map_err(|refusal| refusal.to_string())?;
+        let detections = frame.detections.as_ref().map_err(ToString::to_string)?;
         let sigma_px = self.settings.pixel_sigma_px;
         let observations =
             observe(camera, detections, sigma_px, |id| self.map.get(id)).map_err(words)?;
