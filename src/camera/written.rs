@@ -1,0 +1,149 @@
+//! A changed calibration, and what it may still have wrong, as the files that the readers here accept.
+
+use std::fmt::Write as _;
+
+use nalgebra::DMatrix;
+
+use super::budget_file::NAMES;
+use super::calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};
+use super::distortion::Lens;
+use super::{Camera, CameraInfo};
+
+impl CameraInfo {
+    /// Returns the calibration of the raw image with a change of the camera that was made from it: `K` and `D`, and `P` where
+    /// it is `K`.
+    ///
+    /// # Inputs
+    /// * `camera`: made from this info, not rectified.
+    #[must_use]
+    pub fn with_change(&self, camera: &Camera, change: &CalibrationChange) -> Self {
+        let mut info = self.clone();
+        let was_same = [0, 2, 4, 5].map(|k| self.k[k] == self.p[k + k / 3]);
+        info.k[0] *= change[0].exp();
+        info.k[4] *= change[1].exp();
+        // The image of the detections may be binned.
+        info.k[2] += change[2] * self.k[0] / camera.fx;
+        info.k[5] += change[3] * self.k[4] / camera.fy;
+        if was_same.iter().all(|same| *same) {
+            for k in [0, 2, 4, 5] {
+                info.p[k + k / 3] = info.k[k];
+            }
+        }
+        let coefficients = (0..CALIBRATION_SIZE - FIRST_COEFFICIENT)
+            .map(|index| change[FIRST_COEFFICIENT + index]);
+        let needed = coefficients
+            .clone()
+            .enumerate()
+            .filter(|(_, change)| *change != 0.0)
+            .map(|(index, _)| index + 1)
+            .max()
+            .unwrap_or(0);
+        if needed > 0 {
+            let least = match camera.lens {
+                Some(Lens::Equidistant(_)) => 4,
+                _ if needed > 5 || self.d.len() > 5 => 8,
+                _ => 5,
+            };
+            if info.d.len() < least {
+                info.d.resize(least, 0.0);
+            }
+            for (value, change) in info.d.iter_mut().zip(coefficients) {
+                *value += change;
+            }
+            if !matches!(camera.lens, Some(Lens::Equidistant(_))) {
+                let is_short = info.d.len() <= 5;
+                info.distortion_model = if is_short {
+                    "plumb_bob"
+                } else {
+                    "rational_polynomial"
+                }
+                .to_owned();
+            }
+        }
+        info
+    }
+
+    /// Returns the calibration in the format of ROS's `camera_calibration_parsers`; [`Self::from_yaml`] reads it back.
+    #[must_use]
+    pub fn to_yaml(&self) -> String {
+        let row = |values: &[f64]| {
+            let values: Vec<String> = values.iter().map(f64::to_string).collect();
+            values.join(", ")
+        };
+        let matrix = |name: &str, rows: usize, values: &[f64]| {
+            let cols = values.len() / rows.max(1);
+            format!(
+                "{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n",
+                row(values)
+            )
+        };
+        let mut text = format!(
+            "image_width: {}\nimage_height: {}\ncamera_name: camera\n",
+            self.width, self.height
+        );
+        text += &matrix("camera_matrix", 3, &self.k);
+        let model = serde_json::Value::from(self.distortion_model.as_str());
+        // Writing into a string cannot fail.
+        let _ = writeln!(text, "distortion_model: {model}");
+        text += &matrix("distortion_coefficients", 1, &self.d);
+        text += &matrix("rectification_matrix", 3, &self.r);
+        text += &matrix("projection_matrix", 3, &self.p);
+        let roi = &self.roi;
+        let _ = writeln!(
+            text,
+            "binning_x: {}\nbinning_y: {}\nroi:\n  x_offset: {}\n  y_offset: {}\n  height: {}\n  width: {}\n  do_rectify: {}",
+            self.binning_x,
+            self.binning_y,
+            roi.x_offset,
+            roi.y_offset,
+            roi.height,
+            roi.width,
+            roi.do_rectify
+        );
+        text
+    }
+
+    /// Returns a calibration budget with a covariance of the calibration, as
+    /// [`CalibrationBudget`](super::CalibrationBudget) reads it.
+    ///
+    /// # Inputs
+    /// * `camera`: made from this info.
+    /// * `covariance`: in the order and units of a [`CalibrationChange`].
+    #[must_use]
+    pub fn budget_to_yaml(&self, camera: &Camera, covariance: &DMatrix<f64>) -> String {
+        let of_raw = |k: f64, used: f64| if k > 0.0 { k } else { used };
+        let (fx, fy) = (of_raw(self.k[0], camera.fx), of_raw(self.k[4], camera.fy));
+        let unit = |index: usize| match index {
+            0 => fx,
+            1 => fy,
+            2 => fx / camera.fx,
+            3 => fy / camera.fy,
+            _ => 1.0,
+        };
+        let is_equidistant = matches!(camera.lens, Some(Lens::Equidistant(_)));
+        let name = |index: usize| match index.checked_sub(FIRST_COEFFICIENT) {
+            Some(coefficient) if is_equidistant => {
+                ["k1", "k2", "k3", "k4"].get(coefficient).copied()
+            }
+            _ => NAMES.get(index).copied(),
+        };
+        let used: Vec<(usize, &str)> = (0..CALIBRATION_SIZE)
+            .filter(|&index| covariance[(index, index)] > 0.0)
+            .filter_map(|index| Some((index, name(index)?)))
+            .collect();
+        let names: Vec<&str> = used.iter().map(|(_, name)| *name).collect();
+        let mut text = format!(
+            "covariance:\n  parameters: [{}]\n  data:\n",
+            names.join(", ")
+        );
+        for (i, _) in &used {
+            let row: Vec<String> = used
+                .iter()
+                .map(|(j, _)| format!("{:e}", covariance[(*i, *j)] * unit(*i) * unit(*j)))
+                .collect();
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "    - [{}]", row.join(", "));
+        }
+        text
+    }
+}
