@@ -149,3 +149,120 @@ impl Frame {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::MountPrior;
+    use crate::camera::{CalibrationChange, CameraInfo, Pixel};
+    use crate::estimation::{CalibrationMode, ErrorBudget, FlexMode};
+    use crate::geometry::optical_from_body;
+    use crate::simulation::pose_in_camera;
+    use crate::target::MarkerMap;
+
+    const MAP: &str = "name: kite
+sigma: 0.05
+markers:
+  - {id: 1, x: 0, y: -1.5, z: 0}
+  - {id: 2, x: 0, y: 1.5, z: 0}
+  - {id: 3, x: 3, y: 0, z: 0.25}
+";
+
+    #[test]
+    fn derivatives_are_the_differences_of_residuals() {
+        const STEP: f64 = 1e-6;
+        let map = MarkerMap::from_yaml(MAP, "kite.yaml").expect("a good map");
+        let flex = FlexMode {
+            name: "wing".to_owned(),
+            time_constant_s: Some(4.0),
+            shape: vec![
+                (1, Vector3::new(0.0, 0.1, 0.3)),
+                (2, Vector3::new(0.0, 0.0, 0.3)),
+            ],
+        };
+        let mode = |index: usize, sigma: f64| {
+            let mut change = CalibrationChange::zeros();
+            change[index] = sigma;
+            CalibrationMode {
+                name: format!("{index}"),
+                change,
+            }
+        };
+        let calibration = vec![mode(0, 0.01), mode(3, 2.0), mode(4, 0.02)];
+        let survey: Vec<_> = map.budget().survey_sigma_m.clone();
+        let budget = ErrorBudget::new(&survey, vec![flex], calibration, 0.5).expect("a budget");
+        let mount = MountPrior {
+            camera_from_receiver: optical_from_body(),
+            sigma_rad: 0.02,
+            attitude_bias_rad: 0.01,
+            attitude_noise_rad: 0.005,
+        };
+        let unknowns = Unknowns::new(&map, &budget, Some(&mount), [0.0, 10.0]).expect("unknowns");
+        let info = CameraInfo {
+            width: 640,
+            height: 480,
+            distortion_model: "plumb_bob".to_owned(),
+            d: vec![-0.2, 0.05, 0.001, -0.001, 0.0],
+            k: [571.0, 0.0, 300.0, 0.0, 580.0, 250.0, 0.0, 0.0, 1.0],
+            ..CameraInfo::default()
+        };
+        let camera = Camera::from_info(&info, false).expect("a usual lens");
+        let model = Model {
+            camera: &camera,
+            unknowns: &unknowns,
+            jitter_px: budget.jitter_px(),
+            lasting: 1.0,
+            attitude_noise_rad: 0.005,
+        };
+        let frame = Frame {
+            time_s: 3.3,
+            camera_from_tanker: pose_in_camera(Vector3::new(15.0, 0.5, 2.0), 3.0, -2.0, 4.0),
+            shake: Vector2::new(0.3, -0.2),
+            points: Vec::new(),
+            reported: None,
+        };
+        let seen = Observation {
+            id: 1,
+            marker_in_tanker: map.get(1).expect("a marker"),
+            pixel: Pixel { u: 310.0, v: 240.0 },
+            sigma_px: 0.5,
+        };
+        let values: Vec<f64> = (0..unknowns.size)
+            .map(|i| 0.01 * (i as f64).sin())
+            .collect();
+        let at = |values: &[f64], frame: &Frame| {
+            let changed = unknowns.camera(&camera, values);
+            model.sight(&changed, values, frame, &seen).expect("seen")
+        };
+        let here = at(&values, &frame);
+        let check = |what: String, ahead: &Sight, behind: &Sight, by: Vector2<f64>| {
+            let difference = (ahead.residual - behind.residual) / (2.0 * STEP);
+            let off = (difference - by).norm();
+            assert!(off < 1e-4 * (1.0 + by.norm()), "{what}: {difference} {by}");
+        };
+        for index in 0..OWN {
+            let moved = |step: f64| {
+                let mut by = Own::zeros();
+                by[index] = step;
+                at(&values, &frame.moved(&by))
+            };
+            let by = here.by_own.column(index).into();
+            check(format!("own {index}"), &moved(STEP), &moved(-STEP), by);
+        }
+        let mut columns: Vec<usize> = here.by_shared.iter().map(|(column, _)| *column).collect();
+        columns.dedup();
+        assert_eq!(
+            columns.len(),
+            3 + 2 + 3,
+            "a body, two amplitudes, three modes"
+        );
+        for (column, by) in &here.by_shared {
+            let moved = |step: f64| {
+                let mut values = values.clone();
+                values[*column] += step;
+                at(&values, &frame)
+            };
+            check(format!("shared {column}"), &moved(STEP), &moved(-STEP), *by);
+        }
+    }
+}

@@ -98,6 +98,7 @@ struct Round {
     cost: f64,
     /// By point: detections, and how many of them were left out.
     left_out: BTreeMap<u32, (usize, usize)>,
+    far_attitudes: usize,
 }
 
 impl Context<'_> {
@@ -154,6 +155,7 @@ impl Context<'_> {
                     noise,
                     cost,
                     left_out,
+                    far_attitudes: selected.far_attitudes,
                 });
             }
             if kept.frames.len() < LEAST_FRAMES {
@@ -191,6 +193,12 @@ impl Context<'_> {
             warnings.push(format!(
                 "{} moves by {:.1} times the sigma that its movement should have: its prior is too small, or something else is wrong",
                 parameter.name, parameter.sigmas
+            ));
+        }
+        if round.far_attitudes > 0 {
+            warnings.push(format!(
+                "the reported attitudes of {} frames are farther from the image than mount and attitudes are stated to be wrong; they were left out",
+                round.far_attitudes
             ));
         }
         let joint = written_covariance(unknowns, covariance, &parameters);

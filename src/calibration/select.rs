@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::model::Frame;
@@ -13,12 +13,17 @@ use crate::estimation::{Estimator, Expected, Observation, Solution};
 /// Factors on stated sigmas below this are not worth another selection.
 const NOTABLE_FACTOR: f64 = 1.2;
 
+/// The square of a turn over its covariance, three degrees of freedom, that a correct attitude exceeds once in 100,000.
+const FAR_ATTITUDE: f64 = 25.9;
+
 /// What was selected.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Selected {
     pub(super) frames: Vec<Frame>,
     /// Why the first frame that is not used was refused.
     pub(super) first_reason: Option<String>,
+    /// Frames whose reported attitude is too far from the image's to be an error of mount and attitudes as stated.
+    pub(super) far_attitudes: usize,
     /// By point: detections of trusted frames, and how many of them the estimator left out.
     pub(super) left_out: BTreeMap<u32, (usize, usize)>,
 }
@@ -75,14 +80,19 @@ pub(super) fn select(
                     *out += usize::from(solution.excluded.contains(seen.id));
                 }
                 let is_used = |seen: &Observation| !solution.excluded.contains(seen.id);
+                let reported = mount.and_then(|mount| {
+                    Some(mount.camera_from_receiver * frame.receiver_from_tanker?)
+                });
+                let near = reported.filter(|reported| {
+                    mount.is_some_and(|mount| is_near(&solution, reported, mount))
+                });
+                selected.far_attitudes += usize::from(reported.is_some() && near.is_none());
                 selected.frames.push(Frame {
                     time_s: frame.time_s,
                     camera_from_tanker: solution.camera_from_tanker,
                     shake: Vector2::zeros(),
                     points: observations.into_iter().filter(is_used).collect(),
-                    reported: mount.and_then(|mount| {
-                        Some(mount.camera_from_receiver * frame.receiver_from_tanker?)
-                    }),
+                    reported: near,
                 });
             }
             Err(reason) => {
@@ -91,6 +101,19 @@ pub(super) fn select(
         }
     }
     selected
+}
+
+/// Returns whether a reported attitude is within what mount and attitudes may be wrong by.
+fn is_near(solution: &Solution, reported: &Rotation3<f64>, mount: &MountPrior) -> bool {
+    let found = solution.camera_from_tanker.rotation.to_rotation_matrix();
+    let turn = UnitQuaternion::from_rotation_matrix(&(found * reported.inverse())).scaled_axis();
+    let of_mount = mount.sigma_rad.powi(2)
+        + mount.attitude_bias_rad.powi(2)
+        + mount.attitude_noise_rad.powi(2);
+    let covariance =
+        solution.covariance.0.fixed_view::<3, 3>(3, 3) + Matrix3::identity() * of_mount;
+    let factor = covariance.cholesky();
+    factor.is_some_and(|factor| turn.dot(&factor.solve(&turn)) <= FAR_ATTITUDE)
 }
 
 fn trusted(

@@ -94,7 +94,8 @@ impl Unknowns {
         let mut size = 3 * bodies.len();
         let mut columns = Vec::with_capacity(flex.len());
         for mode in &flex {
-            let of_mode = FlexColumns::new(mode, size, [from_s, until_s])?;
+            let used = size - 3 * bodies.len();
+            let of_mode = FlexColumns::new(mode, size, used, [from_s, until_s])?;
             size += of_mode.count;
             columns.push(of_mode);
         }
@@ -231,6 +232,7 @@ impl FlexColumns {
     fn new(
         mode: &FlexMode,
         first: usize,
+        used: usize,
         [from_s, until_s]: [f64; 2],
     ) -> Result<Self, CalibrateError> {
         let length_s = (until_s - from_s).max(0.0);
@@ -239,7 +241,7 @@ impl FlexColumns {
             Some(time_constant_s) => {
                 let spacing_s = time_constant_s / PER_TIME_CONSTANT;
                 let need = (length_s / spacing_s).ceil() + 1.0;
-                if first as f64 + need > MOST_AMPLITUDES as f64 {
+                if used as f64 + need > MOST_AMPLITUDES as f64 {
                     return Err(CalibrateError::TooManyAmplitudes {
                         name: mode.name.clone(),
                         time_constant_s,

@@ -147,3 +147,87 @@ impl CameraInfo {
         text
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::CalibrationBudget;
+
+    fn info(model: &str, d: &[f64]) -> CameraInfo {
+        let k = [571.0, 0.0, 300.0, 0.0, 580.0, 250.0, 0.0, 0.0, 1.0];
+        CameraInfo {
+            width: 640,
+            height: 480,
+            distortion_model: model.to_owned(),
+            d: d.to_vec(),
+            k,
+            r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            p: [
+                571.0, 0.0, 300.0, 0.0, 0.0, 580.0, 250.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+            ],
+            binning_x: 2,
+            binning_y: 2,
+            ..CameraInfo::default()
+        }
+    }
+
+    fn change(coefficients: usize) -> CalibrationChange {
+        let mut change = CalibrationChange::zeros();
+        change
+            .as_mut_slice()
+            .iter_mut()
+            .take(FIRST_COEFFICIENT + coefficients)
+            .enumerate()
+            .for_each(|(index, value)| *value = 0.002 * (index as f64 + 1.0));
+        change
+    }
+
+    #[test]
+    fn a_changed_info_is_the_changed_camera_and_its_file_is_read_back() {
+        for (model, d, coefficients) in [
+            ("", &[][..], 0),
+            ("plumb_bob", &[], 2),
+            ("plumb_bob", &[-0.28, 0.09, 0.0008, -0.0005, -0.012], 5),
+            ("plumb_bob", &[-0.28, 0.09, 0.0008, -0.0005], 8),
+            ("equidistant", &[-0.02, 0.01, 0.002, -0.001], 4),
+        ] {
+            let info = info(model, d);
+            let camera = Camera::from_info(&info, false).expect("a usual lens");
+            let by = change(coefficients);
+            let changed = info.with_change(&camera, &by);
+            let found = Camera::from_info(&changed, false).expect("a usual lens");
+            let expected = camera.with_change(&by);
+            for (u, v) in [(20.0, 30.0), (150.0, 125.0), (300.0, 220.0)] {
+                let pixel = crate::camera::Pixel { u, v };
+                let ray = found.ray_from_pixel(pixel).expect("inside");
+                let (there, _) = expected.project(ray).expect("inside");
+                let off = (there.u - u).hypot(there.v - v);
+                assert!(off < 1e-6, "{model} {coefficients}: {off} px");
+            }
+            let (read, warnings) = CameraInfo::from_yaml(&changed.to_yaml(), "c").expect("read");
+            assert_eq!(read, changed);
+            assert!(warnings.is_empty(), "{warnings:?}");
+            assert!((changed.p[0] - changed.k[0]).abs() < 1e-12, "P was K");
+        }
+    }
+
+    #[test]
+    fn a_covariance_is_read_back_from_its_file() {
+        let info = info("plumb_bob", &[-0.28, 0.09, 0.0, 0.0, 0.0]);
+        let camera = Camera::from_info(&info, false).expect("a usual lens");
+        // Both focal lengths together, and a coefficient that goes with them.
+        let mut one = DMatrix::zeros(CALIBRATION_SIZE, 2);
+        (one[(0, 0)], one[(1, 0)], one[(4, 0)]) = (0.003, 0.003, -0.002);
+        (one[(2, 1)], one[(4, 1)]) = (0.8, 0.004);
+        let covariance = &one * one.transpose();
+        let text = info.budget_to_yaml(&camera, &covariance);
+        let budget =
+            CalibrationBudget::from_yaml(&text, "b.yaml").expect("what is written is read");
+        let mut sum = DMatrix::zeros(CALIBRATION_SIZE, CALIBRATION_SIZE);
+        for (_, change) in budget.changes(&info, &camera).expect("the same lens") {
+            sum += change * change.transpose();
+        }
+        let off = (&sum - &covariance).amax();
+        assert!(off < 1e-9, "{off}");
+    }
+}

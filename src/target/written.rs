@@ -166,3 +166,70 @@ fn flex(mode: &Flex) -> String {
 fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAP: &str = "name: 'kite: 2'
+sigma: 0.02
+markers:
+  - {id: 1, x: 0.1, y: -1.5, z: 0}
+  - {id: 2, x: 0, y: 1.5, z: 0, sigma: 0.005}
+  - {id: 3, x: 3, y: 0, z: 0.25, sigma: 0}
+tags:
+  - {id: 7, size_m: 0.5, family: tag36h11, x: 3, y: 1, z: 2, roll_deg: 90, pitch_deg: 1, yaw_deg: -80, sigma: 0.01}
+flex:
+  - {name: wing, sigma: 0.2, time_constant_s: 3, shape: [{id: 1, z: 1}, {tag: 7, z: 0.5}]}
+points:
+  - {name: tail, x: 7.8, y: 0, z: 1}
+";
+
+    fn map() -> MarkerMap {
+        MarkerMap::from_yaml(MAP, "m.yaml").expect("a good map")
+    }
+
+    #[test]
+    fn a_map_that_does_not_change_is_read_back_as_it_was() {
+        let map = map();
+        let same = MapChange {
+            flex: map.budget().flex.clone(),
+            ..MapChange::default()
+        };
+        let read = map.changed(&same).expect("what is written is read");
+        assert_eq!(read.name(), map.name());
+        assert_eq!(read.budget(), map.budget());
+        assert_eq!(read.points(), map.points());
+        assert_eq!(read.tags()[0].family, map.tags()[0].family);
+        for (read, was) in read.markers().iter().zip(map.markers()) {
+            assert_eq!(read.id, was.id);
+            let off = (read.marker_in_tanker - was.marker_in_tanker).norm();
+            assert!(off < 1e-9, "{}: {off}", was.id);
+        }
+    }
+
+    #[test]
+    fn what_moves_moves_with_its_sigma_and_corners_with_their_tag() {
+        let map = map();
+        let shift_in_tanker = Vector3::new(0.01, 0.0, -0.02);
+        let body = BodyChange {
+            shift_in_tanker,
+            sigma_m: 0.001_230_1,
+        };
+        let change = MapChange {
+            markers: BTreeMap::from([(1, body)]),
+            tags: BTreeMap::from([(7, body)]),
+            flex: Vec::new(),
+        };
+        let moved = map.changed(&change).expect("a good map");
+        for id in [1, 70, 73] {
+            let by = moved.get(id).expect("there") - map.get(id).expect("there");
+            assert!((by - shift_in_tanker).norm() < 1e-5, "{id}: {by}");
+        }
+        assert_eq!(moved.get(2), map.get(2));
+        // Rounded upwards; a corner has twice its tag's.
+        let sigmas = &moved.budget().survey_sigma_m;
+        assert_eq!(sigmas[..3], [(1, 0.001_24), (2, 0.005), (70, 0.002_48)]);
+        assert!(moved.budget().flex.is_empty());
+    }
+}
