@@ -6,16 +6,19 @@
 //! model        residuals of a frame and their derivatives
 //! adjust       the most probable poses and unknowns; the poses are eliminated
 //! leverage     what of each residual the fit has taken away
-//! noise        the detector: sigma, growth with range, correlation in time and between corners of a tag
+//! noise        the detector: sigma and its growth with the range
+//! correlation  what of its noise lasts from frame to frame, or is common to the corners of a tag
 //! decide       which unknowns the data support moving, and the covariance of what is then wrong
 //! gauge        how far the data tell a common shift, rotation and scale of the tanker's frame
 //! dominate     sigmas and modes that a marker map can state and that claim no more than that covariance
-//! outcome      the result
+//! result       map, camera and mount as they are written
+//! outcome      what of all this is told
 //! ```
 //!
 //! Knows `estimation`, `camera`, `target`, `geometry`; never a file, a topic or a clock (times are arguments).
 
 mod adjust;
+mod correlation;
 mod decide;
 mod dominate;
 mod gauge;
@@ -23,6 +26,7 @@ mod leverage;
 mod model;
 mod noise;
 mod outcome;
+mod result;
 mod run;
 mod select;
 mod unknowns;
@@ -31,8 +35,9 @@ use nalgebra::Rotation3;
 
 use crate::estimation::Observation;
 
+pub use correlation::{CornerCorrelation, TimeCorrelation};
 pub use gauge::GaugeMode;
-pub use noise::{CornerCorrelation, DetectorNoise, MarkerNoise, RangeBin, TimeCorrelation};
+pub use noise::{DetectorNoise, MarkerNoise, RangeBin};
 pub use outcome::{Calibration, CameraOutcome, MapOutcome, MountOutcome, Movement, Parameter};
 pub use run::calibrate;
 

@@ -2,23 +2,24 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{DMatrix, DVector, Rotation3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::adjust::{Adjusted, State, adjust, cost, linearise};
+use super::correlation::usual_spacing_s;
 use super::decide::{decide, written_covariance};
-use super::dominate::{dominate, separate};
+use super::dominate::separate;
 use super::gauge::gauge_modes;
 use super::leverage::{FrameResiduals, residuals};
 use super::model::Model;
-use super::noise::{DetectorNoise, detector_noise, usual_spacing_s};
-use super::outcome::{Calibration, CameraOutcome, MapOutcome, MountOutcome, Movement, Parameter};
+use super::noise::{DetectorNoise, detector_noise};
+use super::outcome::Calibration;
+use super::result::Results;
 use super::select::{needed_factor, select};
-use super::unknowns::{BodyId, Unknowns};
+use super::unknowns::Unknowns;
 use super::{CalibrateError, CalibrationSettings, RecordedFrame};
-use crate::camera::{CALIBRATION_SIZE, Camera};
+use crate::camera::Camera;
 use crate::estimation::{ErrorBudget, Estimator};
-use crate::target::{BodyChange, Flex, MAP_ERROR, MAX_FLEX_MODES, MapChange, MarkerMap};
+use crate::target::MarkerMap;
 
 /// Frames below which nothing is calibrated.
 const LEAST_FRAMES: usize = 10;
@@ -68,7 +69,8 @@ pub fn calibrate(
         let next = round.noise.factor_of_stated;
         let next_lasting = round
             .noise
-            .lasting_factor(usual_spacing_s(&round.residuals));
+            .lasting_factor(usual_spacing_s(&round.residuals))
+            * round.noise.corner_factor();
         let is_settled =
             (next / factor - 1.0).abs() < SETTLED && (next_lasting / lasting - 1.0).abs() < SETTLED;
         if is_settled {
@@ -203,7 +205,14 @@ impl Context<'_> {
         }
         let joint = written_covariance(unknowns, covariance, &parameters);
         let (of_bodies, of_camera) = separate(&joint, 3 * unknowns.bodies.len());
-        let map = self.map_outcome(&joint, &of_bodies, &parameters, values)?;
+        let results = Results {
+            map: self.map,
+            unknowns,
+            mount: self.settings.mount.as_ref(),
+            parameters: &parameters,
+            values,
+        };
+        let map = results.map_outcome(&joint, &of_bodies)?;
         let used_points = frames.iter().map(|frame| frame.points.len()).sum();
         Ok(Calibration {
             frames: self.recorded.len(),
@@ -216,8 +225,8 @@ impl Context<'_> {
             noise: round.noise,
             lasting_factor,
             map,
-            camera: self.camera_outcome(&of_camera, &parameters, values),
-            mount: self.mount_outcome(covariance, &parameters, values, mount_frames),
+            camera: results.camera_outcome(&of_camera),
+            mount: results.mount_outcome(covariance, mount_frames),
             parameters,
             warnings,
         })
@@ -240,139 +249,6 @@ impl Context<'_> {
             suspects.extend(self.unknowns.body_of(*point));
         }
         suspects
-    }
-
-    fn map_outcome(
-        &self,
-        joint: &DMatrix<f64>,
-        to_claim: &DMatrix<f64>,
-        parameters: &[Parameter],
-        values: &[f64],
-    ) -> Result<MapOutcome, CalibrateError> {
-        let unknowns = self.unknowns;
-        let size = 3 * unknowns.bodies.len();
-        let is_kept = |flex: &&Flex| !flex.name.starts_with(MAP_ERROR);
-        let kept: Vec<Flex> = self
-            .map
-            .budget()
-            .flex
-            .iter()
-            .filter(is_kept)
-            .cloned()
-            .collect();
-        let mut change = MapChange {
-            flex: kept,
-            ..MapChange::default()
-        };
-        let statement = dominate(to_claim, MAX_FLEX_MODES.saturating_sub(change.flex.len()));
-        for (index, body) in unknowns.bodies.iter().enumerate() {
-            let mut of_body = BodyChange {
-                sigma_m: statement.variances[index].sqrt(),
-                ..BodyChange::default()
-            };
-            for axis in 0..3 {
-                let moved = parameters
-                    .iter()
-                    .any(|p| p.column == 3 * index + axis && p.movement == Movement::Moved);
-                if moved {
-                    of_body.shift_in_tanker[axis] = values[3 * index + axis];
-                }
-            }
-            match body.id {
-                BodyId::Marker(id) => change.markers.insert(id, of_body),
-                BodyId::Tag(id) => change.tags.insert(id, of_body),
-            };
-        }
-        for (index, mode) in statement.modes.iter().enumerate() {
-            change.flex.push(self.map_error(index, mode));
-        }
-        let map = self.map.changed(&change)?;
-        Ok(MapOutcome {
-            change,
-            map,
-            covariance: joint.view((0, 0), (size, size)).into_owned(),
-            claimed: statement.covariance(),
-            bodies: unknowns.bodies.iter().map(|body| body.id.name()).collect(),
-        })
-    }
-
-    /// Returns a mode as a map states it: the largest displacement is 1.
-    fn map_error(&self, index: usize, mode: &DVector<f64>) -> Flex {
-        let bodies = self.unknowns.bodies.iter().enumerate();
-        let shifts: Vec<_> = bodies
-            .map(|(body, of)| (of, mode.fixed_rows::<3>(3 * body).into_owned()))
-            .collect();
-        let sigma_m = shifts
-            .iter()
-            .map(|(_, shift)| shift.norm())
-            .fold(0.0, f64::max);
-        let shape = shifts.iter().flat_map(|(body, shift)| {
-            let shift = shift / sigma_m.max(f64::MIN_POSITIVE);
-            body.points.iter().map(move |point| (*point, shift))
-        });
-        let mut shape: Vec<_> = shape.collect();
-        shape.sort_unstable_by_key(|(point, _)| *point);
-        Flex {
-            name: format!("{MAP_ERROR}{}", index + 1),
-            sigma_m,
-            time_constant_s: None,
-            shape,
-        }
-    }
-
-    fn camera_outcome(
-        &self,
-        covariance: &DMatrix<f64>,
-        parameters: &[Parameter],
-        values: &[f64],
-    ) -> Option<CameraOutcome> {
-        let unknowns = self.unknowns;
-        let count = unknowns.camera.len();
-        if count == 0 {
-            return None;
-        }
-        let of_camera = unknowns.first_of_camera..unknowns.first_of_camera + count;
-        let mut written = vec![0.0; unknowns.size];
-        let mut is_moved = false;
-        for parameter in parameters {
-            if of_camera.contains(&parameter.column) && parameter.movement == Movement::Moved {
-                written[parameter.column] = values[parameter.column];
-                is_moved = true;
-            }
-        }
-        let changes = DMatrix::from_fn(CALIBRATION_SIZE, count, |row, mode| {
-            unknowns.camera[mode].change[row]
-        });
-        Some(CameraOutcome {
-            is_moved,
-            change: unknowns.camera_change(&written),
-            covariance: &changes * covariance * changes.transpose(),
-        })
-    }
-
-    fn mount_outcome(
-        &self,
-        covariance: &DMatrix<f64>,
-        parameters: &[Parameter],
-        values: &[f64],
-        frames: usize,
-    ) -> Option<MountOutcome> {
-        let (at, prior) = (self.unknowns.mount?, self.settings.mount.as_ref()?);
-        let mut turn = nalgebra::Vector3::zeros();
-        let mut sigma_rad = [prior.sigma_rad; 3];
-        for axis in 0..3 {
-            let own = parameters.iter().find(|p| p.column == at + axis)?;
-            if own.movement == Movement::Moved {
-                turn[axis] = values[at + axis];
-                sigma_rad[axis] = covariance[(at + axis, at + axis)].sqrt();
-            }
-        }
-        Some(MountOutcome {
-            is_moved: turn.norm() > 0.0,
-            frames,
-            camera_from_receiver: Rotation3::new(turn) * prior.camera_from_receiver,
-            sigma_rad,
-        })
     }
 }
 

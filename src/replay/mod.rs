@@ -3,6 +3,7 @@
 //! ```text
 //! answer          one recording from its first message to its last
 //! flight          all frames of a recording, checked, for tools that look at them together
+//! reading         those frames as they are read, with the camera and the attitudes of their time
 //! routes          which of its topics are the node's inputs, and what of them can be used
 //! sinks           where the answers go: a recording that holds the inputs too
 //! summary         what was read, answered and left out
@@ -13,6 +14,7 @@
 
 mod answer;
 mod flight;
+mod reading;
 mod routes;
 mod sinks;
 mod summary;
@@ -26,7 +28,8 @@ use crate::config::{self, Configuration, TogetherError};
 use crate::recording::WriteError;
 use crate::target::MarkerMap;
 
-pub use flight::{Flight, FlightError};
+pub use flight::FlightError;
+pub use reading::Flight;
 pub use summary::Summary;
 
 /// Why a recording cannot be answered.

@@ -1,6 +1,7 @@
 """`tanker_pose calibrate-map`: a recorded approach to a tanker whose markers are not where its map has them."""
 
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -80,8 +81,10 @@ def test_the_refined_map_fits_its_recording_and_the_nodes_code_accepts_all_files
         bag, tmp_path / "out.mcap", "--params-file", str(folder / "parameters.yaml")
     )
     assert replayed.returncode == 0, replayed.stderr
-    frames = report["frames"]
-    assert f"OK {frames}" in replayed.stdout or "OK 124" in replayed.stdout, replayed.stdout
+    count = re.search(r"\bOK (\d+)", replayed.stdout)
+    assert count is not None, replayed.stdout
+    # One in a thousand correct frames fails the test of its residuals.
+    assert int(count[1]) >= report["frames"] - 2, replayed.stdout
 
 
 def test_an_exact_map_is_refused_with_what_to_state(
