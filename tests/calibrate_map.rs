@@ -187,7 +187,8 @@ fn pose_nees(world: &World, found: &Calibration) -> f64 {
     nees.iter().sum::<f64>() / nees.len() as f64
 }
 
-fn assert_poses_are_honest(what: &str, plan: Plan, count: u64) {
+/// Not better than the written files claim; they claim less than is known, as docs/calibrate-map.md says.
+fn assert_poses_are_honest(what: &str, plan: Plan, count: u64, allowed: std::ops::Range<f64>) {
     let nees: Vec<f64> = (0..count)
         .into_par_iter()
         .map(|seed| {
@@ -199,12 +200,12 @@ fn assert_poses_are_honest(what: &str, plan: Plan, count: u64) {
     let variance = nees.iter().map(|n| (n - mean).powi(2)).sum::<f64>() / nees.len() as f64;
     let error = (variance / nees.len() as f64).sqrt();
     println!("{what}: NEES of poses of another approach {mean:.2} ± {error:.2}");
-    assert!((5.5..6.5).contains(&mean), "{what}: {mean} ± {error}");
+    assert!(allowed.contains(&mean), "{what}: {mean} ± {error}");
 }
 
 #[test]
 fn poses_of_another_approach_are_honest_with_the_written_map() {
-    assert_poses_are_honest("markers", Plan::default(), 400);
+    assert_poses_are_honest("markers", Plan::default(), 400, 4.4..6.3);
 }
 
 #[test]
@@ -214,7 +215,7 @@ fn poses_of_another_approach_are_honest_with_the_written_map_and_camera() {
         intrinsics: true,
         ..Plan::default()
     };
-    assert_poses_are_honest("markers and focal length", plan, 400);
+    assert_poses_are_honest("markers and focal length", plan, 400, 4.0..6.3);
 }
 
 #[test]
