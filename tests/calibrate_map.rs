@@ -56,6 +56,18 @@ fn marker_squares(trials: &[(World, Calibration)]) -> Vec<f64> {
 fn markers_off_by_5_cm_are_found_within_their_predicted_covariance() {
     let trials = trials(60, Plan::default());
     assert_consistent("markers", &marker_squares(&trials), 24);
+    // The squares of each trial have 50 frames · 10 degrees of freedom, the mean of their roots over 60 a standard error of 0.4 %.
+    let factors = trials.iter().map(|(_, found)| found.noise.factor_of_stated);
+    let factor = factors.sum::<f64>() / 60.0;
+    let modes: usize = trials
+        .iter()
+        .map(|(_, found)| found.map.change.flex.len())
+        .sum();
+    println!(
+        "factor of the stated sigma {factor:.4}; {:.1} modes",
+        modes as f64 / 60.0
+    );
+    assert!((factor - 1.0).abs() < 0.02, "{factor}");
     // And it is worth it: what images tell of the shape becomes much better than the survey.
     let rms = |errors: &nalgebra::DVector<f64>| errors.norm_squared() / errors.len() as f64;
     let before: f64 = trials
@@ -187,7 +199,6 @@ fn pose_nees(world: &World, found: &Calibration) -> f64 {
     nees.iter().sum::<f64>() / nees.len() as f64
 }
 
-/// Not better than the written files claim; they claim less than is known, as docs/calibrate-map.md says.
 fn assert_poses_are_honest(what: &str, plan: Plan, count: u64, allowed: std::ops::Range<f64>) {
     let nees: Vec<f64> = (0..count)
         .into_par_iter()
@@ -205,17 +216,19 @@ fn assert_poses_are_honest(what: &str, plan: Plan, count: u64, allowed: std::ops
 
 #[test]
 fn poses_of_another_approach_are_honest_with_the_written_map() {
-    assert_poses_are_honest("markers", Plan::default(), 400, 4.4..6.3);
+    assert_poses_are_honest("markers", Plan::default(), 400, 5.5..6.5);
 }
 
+/// Map and camera are correlated, which their two files cannot say: each is widened, and the poses are better than they
+/// claim.
 #[test]
-fn poses_of_another_approach_are_honest_with_the_written_map_and_camera() {
+fn poses_of_another_approach_are_not_better_than_the_written_map_and_camera_claim() {
     let plan = Plan {
         focal_length: 0.01,
         intrinsics: true,
         ..Plan::default()
     };
-    assert_poses_are_honest("markers and focal length", plan, 400, 4.0..6.3);
+    assert_poses_are_honest("markers and focal length", plan, 400, 5.0..6.3);
 }
 
 #[test]
@@ -277,8 +290,10 @@ fn what_the_data_cannot_tell_is_not_moved() {
         assert_eq!(parameter.movement, Movement::NotSupported, "{parameter:?}");
     }
     assert_eq!(found.map.map.get(8), world.believed.get(8));
-    let (_, sigma_m) = found.map.map.budget().survey_sigma_m[7];
-    assert!(sigma_m >= SURVEY_M, "{sigma_m}");
+    for row in 21..24 {
+        let claimed_m = found.map.claimed[(row, row)].sqrt();
+        assert!(claimed_m > SURVEY_M * 0.999, "{claimed_m}");
+    }
 
     let seven = World::new(3, Plan::default()).calibrate().gauge;
     assert_eq!(seven.len(), 7);
@@ -368,7 +383,7 @@ fn a_written_map_claims_no_less_than_its_covariance_in_any_direction() {
             claimed += &shift * shift.transpose();
         }
         let least = (claimed - &map.covariance).symmetric_eigenvalues().min();
-        assert!(least > -1e-12, "seed {}: {least} m²", world.seed);
+        assert!(least > -2e-12, "seed {}: {least} m²", world.seed);
     }
 }
 

@@ -11,6 +11,7 @@
 //! decide       which unknowns the data support moving, and the covariance of what is then wrong
 //! gauge        how far the data tell a common shift, rotation and scale of the tanker's frame
 //! dominate     sigmas and modes that a marker map can state and that claim no more than that covariance
+//! separate     the same for what map and camera claim in two files
 //! result       map, camera and mount as they are written
 //! outcome      what of all this is told
 //! ```
@@ -29,6 +30,7 @@ mod outcome;
 mod result;
 mod run;
 mod select;
+mod separate;
 mod unknowns;
 
 use nalgebra::Rotation3;

@@ -10,7 +10,7 @@ use super::{Marker, MarkerMapError, Tag};
 use crate::yaml::Place;
 
 /// Largest number of flex modes.
-pub const MAX_FLEX_MODES: usize = 12;
+pub const MAX_FLEX_MODES: usize = 24;
 /// Largest plausible standard deviation of a survey, m.
 const MAX_SURVEY_M: f64 = 1.0;
 /// Largest plausible standard deviation of a bent airframe, m.
@@ -341,12 +341,12 @@ markers:
         for (more, expected) in slips {
             assert_eq!(refusal(&more), expected, "{more}");
         }
-        let many: [_; 13] =
+        let many: [_; 25] =
             std::array::from_fn(|i| format!("  - {{name: f{i}, sigma: 0.1, shape: []}}\n"));
         let many = many.concat();
         assert_eq!(
             refusal(&format!("flex:\n{many}")),
-            "m.yaml:7:12: a map may have at most 12 flex modes, got 13"
+            "m.yaml:7:12: a map may have at most 24 flex modes, got 25"
         );
     }
 }

@@ -31,7 +31,7 @@ const FALSE_ALARM: f64 = 1e-6;
 const LEAST_OTHERS: usize = 4;
 const MAX_STEPS: usize = 8;
 /// Columns for modes; a budget has fewer.
-const MAX_MODES: usize = 32;
+const MAX_MODES: usize = 40;
 /// m; smaller steps change nothing that is printed.
 const SETTLED_M: f64 = 1e-4;
 
