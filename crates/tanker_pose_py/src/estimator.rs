@@ -8,7 +8,9 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use tanker_pose::estimation::{Estimator, Initialisation};
 use tanker_pose::geometry::nearest_rotation;
-use tanker_pose::pipeline::{self, Detection, FrameOutcome, error_budget, modes_of_file, observe};
+use tanker_pose::pipeline::{
+    self, Bare, Detection, FrameOutcome, error_budget, modes_of_file, observe,
+};
 
 use crate::arrays::{doubles, ids as read_ids};
 use crate::budget::PyBudget;
@@ -47,6 +49,26 @@ impl PyEstimator {
         let (observations, left_out) = sight.edges.leave_out(observations, self.edge_margin_px);
         pipeline::solve(&self.estimator, &sight.camera, &observations, previous).without(left_out)
     }
+
+    /// Writes the records of frames from `first` on: the same verdicts as of [`Self::outcome`], without words.
+    fn fill(&self, rows: &mut [u8], size: usize, first: usize, frames: &Frames) {
+        let sight = self.camera.get();
+        let bare = Bare {
+            estimator: &self.estimator,
+            camera: &sight.camera,
+            edges: &sight.edges,
+            edge_margin_px: self.edge_margin_px,
+            pixel_sigma_px: self.pixel_sigma_px,
+        };
+        let mut detections = Vec::with_capacity(frames.ids.len());
+        let mut observed = Vec::with_capacity(frames.ids.len());
+        for (index, row) in rows.chunks_exact_mut(size).enumerate() {
+            frames.detections(first + index, &mut detections);
+            let find = |id| self.markers.get(id);
+            let (code, solution) = bare.solve(&detections, find, None, &mut observed);
+            record::write(row, code, solution.as_ref(), &observed, frames.ids);
+        }
+    }
 }
 
 #[pymethods]
@@ -83,6 +105,9 @@ impl PyEstimator {
     }
 
     /// The outcome of one frame; RefusalError without a trusted pose.
+    ///
+    /// pixels: (N, 2), of the markers with these ids, or else of the estimator's. sigma_px: a number or (N,), px.
+    /// previous: the last trusted rotation (3, 3), where initialisation is previous.
     #[pyo3(signature = (pixels, sigma_px=None, *, ids=None, previous=None))]
     fn estimate<'py>(
         &self,
@@ -117,7 +142,15 @@ impl PyEstimator {
         }
     }
 
-    /// The outcomes of many frames, each on its own, as a structured array (F,).
+    /// The outcomes of many frames, each on its own, as a structured array (F,); the work is on all cores, without the
+    /// GIL, so that no other thread may write to the arrays meanwhile.
+    ///
+    /// pixels: (F, N, 2). sigma_px: a number, (N,) or (F, N), px; 0 or None: the parameter pixel_sigma_px. visible: (F, N)
+    /// of bool, the detections that there are; all, without it. A pixel of NaN is a wrong detection, not a missing one.
+    ///
+    /// Fields: rotation (3, 3) and translation (3,) of camera_from_tanker, covariance (6, 6) in ROS's order, all NaN without
+    /// a trusted pose; rms_px, chi_squared, chi_squared_limit, ambiguity, NaN without a fit; degrees_of_freedom,
+    /// iterations; outcome, see Outcome; certificate as in EstimatorStatus; used (N,), the points that the pose rests on.
     #[pyo3(signature = (pixels, sigma_px=None, *, visible=None))]
     fn estimate_many<'py>(
         &self,
@@ -149,13 +182,7 @@ impl PyEstimator {
             py.detach(|| {
                 rows.par_chunks_mut(size * CHUNK)
                     .enumerate()
-                    .for_each(|(chunk, rows)| {
-                        let mut detections = Vec::with_capacity(ids.len());
-                        for (index, row) in rows.chunks_exact_mut(size).enumerate() {
-                            frames.detections(chunk * CHUNK + index, &mut detections);
-                            record::write(row, &self.outcome(&detections, None), ids);
-                        }
-                    });
+                    .for_each(|(chunk, rows)| self.fill(rows, size, chunk * CHUNK, &frames));
             });
         }
         let records = bytes.call_method1("view", (record::dtype(py, ids.len())?,))?;

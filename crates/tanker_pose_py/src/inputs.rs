@@ -1,6 +1,6 @@
 //! The detections of frames, from arrays.
 
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use tanker_pose::pipeline::Detection;
 
@@ -35,7 +35,10 @@ impl<'py> Sigmas<'py> {
         let Some(value) = value else {
             return Ok(Self::One(0.0));
         };
-        if let Ok(sigma_px) = value.extract::<f64>() {
+        // An array of one number would pass as a number.
+        if !value.is_instance_of::<PyUntypedArray>()
+            && let Ok(sigma_px) = value.extract::<f64>()
+        {
             return Ok(Self::One(sigma_px));
         }
         let array = doubles(value)?;

@@ -38,17 +38,20 @@ fn run_tool(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| tanker_pose_tools::run(arguments))
 }
 
-/// Names and numbers of the outcomes and of the effects on the track, as the node's status has them.
+/// Names with numbers of one enum.
+type Codes = Vec<(&'static str, u8)>;
+
+/// Names and numbers of the outcomes, and of the effects on the track, as the node's status has them.
 #[pyfunction]
-fn codes() -> [Vec<(&'static str, u8)>; 2] {
-    [
+fn codes() -> (Codes, Codes) {
+    (
         OutcomeCode::ALL
             .map(|code| (code.name(), code.number()))
             .to_vec(),
         TrackCode::ALL
             .map(|code| (code.name(), code.number()))
             .to_vec(),
-    ]
+    )
 }
 
 #[pymodule]

@@ -1,7 +1,7 @@
 //! Keyword arguments as the node's parameters: the same names, ranges and words.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyInt, PyString};
+use pyo3::types::{PyBool, PyDict, PyString};
 use tanker_pose::config::{self, Configuration, KEYS, ParameterValue, Parameters, TABLE};
 
 use crate::errors::value_error;
@@ -108,8 +108,9 @@ fn parameter(value: &Bound<'_, PyAny>) -> PyResult<ParameterValue> {
     if value.is_instance_of::<PyBool>() {
         return Ok(ParameterValue::Bool(value.extract()?));
     }
-    if value.is_instance_of::<PyInt>() {
-        return Ok(ParameterValue::Integer(value.extract()?));
+    // Whole numbers of numpy too.
+    if let Ok(number) = value.extract::<i64>() {
+        return Ok(ParameterValue::Integer(number));
     }
     if value.is_instance_of::<PyString>() {
         return Ok(ParameterValue::String(value.extract()?));

@@ -4,9 +4,9 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tanker_pose::estimation::{Certificate, Solution};
+use tanker_pose::estimation::{Certificate, Observation, Solution};
 use tanker_pose::messages::EstimatorStatus;
-use tanker_pose::pipeline::FrameOutcome;
+use tanker_pose::pipeline::OutcomeCode;
 
 /// Name, numpy's format, size of one number in bytes, and shape of each field, in the order of [`write`]. The last one,
 /// `used`, has one truth value a point.
@@ -73,8 +73,8 @@ pub fn pose(solution: &Solution) -> ([f64; 9], [f64; 3]) {
 }
 
 /// Returns the number of a certificate, as the node's status has it.
-pub fn certificate(outcome: &FrameOutcome) -> u8 {
-    match outcome.solution().and_then(|solution| solution.certificate) {
+fn certificate(solution: &Solution) -> u8 {
+    match solution.certificate {
         None => EstimatorStatus::CERTIFICATE_NONE,
         Some(Certificate::Certified) => EstimatorStatus::CERTIFICATE_CERTIFIED,
         Some(Certificate::NotCertified) => EstimatorStatus::CERTIFICATE_NOT_CERTIFIED,
@@ -82,18 +82,28 @@ pub fn certificate(outcome: &FrameOutcome) -> u8 {
     }
 }
 
-/// Writes an outcome; `row` has [`size`] bytes.
-pub fn write(row: &mut [u8], outcome: &FrameOutcome, ids: &[u32]) {
+/// Writes an outcome with the numbers of its best fit; `row` has [`size`] bytes.
+///
+/// # Inputs
+/// * `observed`: the observations that reached the solver.
+pub fn write(
+    row: &mut [u8],
+    code: OutcomeCode,
+    solution: Option<&Solution>,
+    observed: &[Observation],
+    ids: &[u32],
+) {
     let mut row = Cursor { row, at: 0 };
-    if let Ok(solution) = &outcome.result {
-        let (rotation, translation) = pose(solution);
-        row.doubles(&rotation);
-        row.doubles(&translation);
-        row.doubles(&solution.covariance.row_major());
-    } else {
-        row.doubles(&[f64::NAN; 48]);
+    match solution {
+        Some(solution) if code == OutcomeCode::Ok => {
+            let (rotation, translation) = pose(solution);
+            row.doubles(&rotation);
+            row.doubles(&translation);
+            row.doubles(&solution.covariance.row_major());
+        }
+        _ => row.doubles(&[f64::NAN; 48]),
     }
-    match outcome.solution() {
+    match solution {
         Some(solution) => {
             row.doubles(&[
                 solution.rms_px,
@@ -109,9 +119,14 @@ pub fn write(row: &mut [u8], outcome: &FrameOutcome, ids: &[u32]) {
             row.bytes(&[0; 4]);
         }
     }
-    row.bytes(&[outcome.code().number(), certificate(outcome)]);
-    for id in ids {
-        row.bytes(&[u8::from(outcome.used_ids.contains(id))]);
+    row.bytes(&[code.number(), solution.map_or(0, certificate)]);
+    let mut observed = observed.iter().map(|seen| seen.id).peekable();
+    for &id in ids {
+        // Both are in the order of the arrays.
+        let is_observed = observed.next_if_eq(&id).is_some();
+        let is_used =
+            solution.is_some_and(|solution| is_observed && !solution.excluded.contains(id));
+        row.bytes(&[u8::from(is_used)]);
     }
     row.fill();
 }
