@@ -17,7 +17,9 @@ use tanker_pose::estimation::{
 };
 use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::{PoseCovariance, optical_from_body};
-use tanker_pose::integrity::{IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount};
+use tanker_pose::integrity::{
+    IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount, SolvedFrame,
+};
 use tanker_pose::refuelling::Region;
 use tanker_pose::simulation::{Scene, paper_camera, pose_in_camera};
 use tanker_pose::target::{Marker, MarkerMap};
@@ -121,7 +123,13 @@ fn integrity(criterion: &mut Criterion) {
             let monitor = IntegrityMonitor::new(settings, mount, vec![point]);
             group.bench_function(BenchmarkId::new(name, count), |bencher| {
                 bencher.iter(|| {
-                    monitor.judge(&estimator, Some(&map), &camera, black_box(&seen), &solution)
+                    monitor.judge(&SolvedFrame {
+                        estimator: &estimator,
+                        map: Some(&map),
+                        camera: &camera,
+                        observations: black_box(&seen),
+                        solution: &solution,
+                    })
                 });
             });
         }

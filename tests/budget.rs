@@ -4,6 +4,7 @@
 //! sqrt(12/N) = 0.077 (5.7–6.3 is 3.9 of them), of three axes sqrt(6/N) = 0.055 (2.8–3.2: 3.7), that of a 95 % coverage
 //! 0.49 % (93.5–96.5 %: 3.1). Among 126 lines the largest of so many deviations is about 2.9.
 
+mod budgets;
 mod drawn_worlds;
 mod support;
 

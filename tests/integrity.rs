@@ -4,26 +4,26 @@
 //! Frames without, with one and with two faults are simulated apart and weighed by their probabilities, so that the rare
 //! ones are seen often enough; three faults count as hazards.
 
+mod budgets;
 mod support;
 
+use budgets::{example_budget, no_budget};
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point3, Translation3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use support::tanker_markers;
-use tanker_pose::camera::{CalibrationChange, Camera};
-use tanker_pose::estimation::{
-    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Observation,
-};
+use tanker_pose::camera::Camera;
+use tanker_pose::estimation::{ErrorBudget, Estimator, EstimatorSettings, Observation, Solution};
 use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::PoseCovariance;
 use tanker_pose::integrity::{
-    IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount, Unavailable,
+    IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount, SolvedFrame, Unavailable,
 };
 use tanker_pose::pipeline::solve;
 use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
-use tanker_pose::target::{Marker, MarkerMap};
+use tanker_pose::target::MarkerMap;
 
 const SIGMA_PX: f64 = 0.5;
 const SEED: u64 = 12;
@@ -123,6 +123,16 @@ impl Experiment {
         }
     }
 
+    fn solved<'a>(&'a self, seen: &'a [Observation], solution: &'a Solution) -> SolvedFrame<'a> {
+        SolvedFrame {
+            estimator: &self.estimator,
+            map: Some(&self.map),
+            camera: &self.camera,
+            observations: seen,
+            solution,
+        }
+    }
+
     fn run(&self, trials: u32, seed: u64, fault: &Fault) -> Vec<Tally> {
         let count = u16::try_from(self.map.markers().len()).expect("few");
         let none = || vec![Tally::default(); self.monitors.len()];
@@ -161,7 +171,7 @@ impl Experiment {
             };
             let Ok(found) = &found else { return tally };
             let share = |is: bool| if is { 1.0 } else { 0.0 };
-            match monitor.judge(&self.estimator, Some(&self.map), &self.camera, &seen, found) {
+            match monitor.judge(&self.solved(&seen, found)) {
                 Ok(integrity) => {
                     tally.available = 1.0;
                     let points = integrity.points.iter().zip(monitor.points());
@@ -188,8 +198,7 @@ impl Experiment {
         let Ok(found) = solve(&self.estimator, &self.camera, seen, None).result else {
             return false;
         };
-        let map = Some(&self.map);
-        let levels = self.monitors[0].judge(&self.estimator, map, &self.camera, seen, &found);
+        let levels = self.monitors[0].judge(&self.solved(seen, &found));
         let error = found.camera_from_tanker * TAIL - pose * TAIL;
         let lateral_m = (flu_from_optical() * error).y.abs();
         levels.is_ok_and(|levels| lateral_m > levels.points[1].level_m[1])
@@ -300,10 +309,6 @@ fn move_some(seen: &mut [Observation], count: usize, random: &mut impl Rng) {
     }
 }
 
-fn no_budget() -> ErrorBudget {
-    ErrorBudget::new(&[], vec![], vec![], 0.0).expect("nothing is wrong with nothing")
-}
-
 /// Probability of 0, 1, 2 and more faults.
 fn weights(count: usize, p: f64) -> [f64; 4] {
     let n = i32::try_from(count).expect("few");
@@ -397,40 +402,10 @@ fn lateral_levels_at_the_tail_are_centimetres_at_15_m() {
     }
 }
 
-/// A budget as the example of a map with one has it, and of a calibration.
-fn budget(markers: &[Marker]) -> ErrorBudget {
-    let survey: Vec<(u32, f64)> = markers.iter().map(|marker| (marker.id, 0.01)).collect();
-    let bend = |marker: &Marker| {
-        let up = 0.2 * (marker.marker_in_tanker.y / 7.13).powi(2);
-        (marker.id, Vector3::new(0.0, 0.0, up))
-    };
-    let flex = FlexMode {
-        name: "wing_bending".to_owned(),
-        time_constant_s: Some(4.0),
-        shape: markers.iter().map(bend).collect(),
-    };
-    let calibration = [
-        ("focal_length", [0, 1].as_slice(), 0.001),
-        ("principal_point_u", &[2], 1.0),
-        ("principal_point_v", &[3], 1.0),
-    ]
-    .map(|(name, places, sigma)| {
-        let mut change = CalibrationChange::zeros();
-        for &place in places {
-            change[place] = sigma;
-        }
-        CalibrationMode {
-            name: name.to_owned(),
-            change,
-        }
-    });
-    ErrorBudget::new(&survey, vec![flex], calibration.to_vec(), 0.3).expect("a budget")
-}
-
 #[test]
 fn hazards_are_as_rare_in_worlds_drawn_from_a_budget() {
     for count in [6, 12] {
-        check_risk(count, 15, budget(&tanker_markers(count)), false);
+        check_risk(count, 15, example_budget(&tanker_markers(count)), false);
     }
 }
 
@@ -446,7 +421,7 @@ fn vertical_levels_of_eight_beacons_with_a_budget_are_within_1_1_m() {
         (29, 0.73),
     ] {
         let settings = IntegritySettings::default();
-        let budget = budget(&tanker_markers(8));
+        let budget = example_budget(&tanker_markers(8));
         let experiment = Experiment::new(8, range_m, &[settings], budget);
         let tally = experiment.run(2_000, 5, &Fault::Moved(0))[0];
         let level_m = tally.level_m.map(|sum| sum / tally.available);
@@ -488,14 +463,7 @@ fn importance_sampling_finds_no_more_than_1e_7() {
             let found = solve(&experiment.estimator, &experiment.camera, &exact, None).result;
             let found = found.expect("an exact frame");
             let monitor = &experiment.monitors[0];
-            let map = Some(&experiment.map);
-            let levels = monitor.judge(
-                &experiment.estimator,
-                map,
-                &experiment.camera,
-                &exact,
-                &found,
-            );
+            let levels = monitor.judge(&experiment.solved(&exact, &found));
             levels.expect("available").points[1].level_m[1]
         };
         let singles = (0..count).map(|i| vec![i]);

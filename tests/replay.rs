@@ -246,20 +246,23 @@ fn damaged_chunk_is_named_and_the_frames_around_it_are_answered() {
     assert!((1000..6000).contains(&count), "{count}");
 }
 
+/// Detections in every other second get a pixel that is no number.
+fn without_numbers_in_odd_seconds(mut message: RecordedMessage) -> Vec<RecordedMessage> {
+    if message.is("/feature_points") {
+        let mut points: FeaturePointArray = message.decode().expect("detections");
+        if points.header.stamp.sec % 2 == 1 {
+            points.points[0].u = f64::NAN;
+            message.bytes = cdr::encode(&points).expect("a message of ROS");
+        }
+    }
+    vec![message]
+}
+
 #[test]
 fn frames_without_numbers_are_refused_and_those_around_them_are_answered() {
     let scratch = Scratch::new("nan");
     let approach = scratch.approach();
-    let nan = scratch.rewritten(&approach, |mut message| {
-        if message.is("/feature_points") {
-            let mut points: FeaturePointArray = message.decode().expect("detections");
-            if points.header.stamp.sec % 2 == 1 {
-                points.points[0].u = f64::NAN;
-                message.bytes = cdr::encode(&points).expect("a message of ROS");
-            }
-        }
-        vec![message]
-    });
+    let nan = scratch.rewritten(&approach, without_numbers_in_odd_seconds);
     let found = Replayed::of(&scratch, &nan, &[]);
     assert_eq!(found.code, 0, "{}", found.words);
     assert!(found.words.contains("NOT_FINITE 50"), "{}", found.words);
@@ -380,16 +383,7 @@ fn warnings_beyond_the_first_twenty_are_counted() {
     let scratch = Scratch::new("warnings");
     let approach = scratch.simulated("240", "1");
     // Every other frame has no number; a fault that comes back is said again after some seconds, here forty times.
-    let blinking = scratch.rewritten(&approach, |mut message| {
-        if message.is("/feature_points") {
-            let mut points: FeaturePointArray = message.decode().expect("detections");
-            if points.header.stamp.sec % 2 == 1 {
-                points.points[0].u = f64::NAN;
-                message.bytes = cdr::encode(&points).expect("a message of ROS");
-            }
-        }
-        vec![message]
-    });
+    let blinking = scratch.rewritten(&approach, without_numbers_in_odd_seconds);
     let found = Replayed::of(&scratch, &blinking, &[]);
     let lines = found.words.lines();
     let printed = lines.filter(|line| line.starts_with("tanker_pose: warning: "));

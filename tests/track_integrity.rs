@@ -5,9 +5,11 @@
 //! without, with one and with two faults are flown apart and weighed by their probabilities; three faults count as
 //! hazards. Bounds come from the scatter of whole approaches, since frames of one share their errors.
 
+mod budgets;
 mod support;
 mod track_flight;
 
+use budgets::{example_budget, no_budget};
 use nalgebra::{Matrix1x6, Vector6};
 use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::{pose_error, skew};
@@ -16,9 +18,7 @@ use tanker_pose::integrity::{
 };
 use tanker_pose::simulation::{World, trial_generator};
 use tanker_pose::tracking::{Filter, FilterSettings};
-use track_flight::{
-    Course, FRAMES, Fault, Flight, Moment, SIGMA_PX, TAIL, budget, error_m, no_budget,
-};
+use track_flight::{Course, FRAMES, Fault, Flight, Moment, SIGMA_PX, TAIL, error_m};
 
 const SEED: u64 = 31;
 const PRIOR: f64 = 1e-2;
@@ -201,7 +201,7 @@ fn hazards_of_lasting_faults_are_as_rare_as_the_levels_of_the_track_say() {
 
 #[test]
 fn hazards_are_as_rare_in_worlds_drawn_from_a_budget() {
-    let budget = budget(&support::tanker_markers(6));
+    let budget = example_budget(&support::tanker_markers(6));
     let flight = Flight::new(budget, &ALLOWED.map(scaled));
     check_risk("budget", &flight, [500, 25]);
 }
@@ -230,7 +230,7 @@ const APPROACHES: u32 = 200;
 fn separations_and_errors_without_a_beacon_scatter_as_they_say() {
     for (what, budget, most) in [
         ("no budget", no_budget(), 1.3),
-        ("budget", budget(&support::tanker_markers(6)), 1.3),
+        ("budget", example_budget(&support::tanker_markers(6)), 1.3),
     ] {
         let flight = Flight::new(budget, &[IntegritySettings::default()]);
         let ids: Vec<u32> = flight

@@ -1,16 +1,16 @@
 //! What the track's protection levels are, and that they follow the track: late frames, new tracks, beacons that come and
 //! go, faults that no single frame shows.
 
+mod budgets;
 mod support;
 mod track_flight;
 
+use budgets::{example_budget, no_budget};
 use nalgebra::Vector2;
 use tanker_pose::integrity::{Hypothesis, IntegritySettings, TrackSeparations, Unavailable};
 use tanker_pose::simulation::{World, trial_generator};
 use tanker_pose::tracking::{Filter, FilterSettings, TrackOutcome};
-use track_flight::{
-    Course, FRAMES, Fault, Flight, Moment, SIGMA_PX, TAIL, budget, error_m, no_budget,
-};
+use track_flight::{Course, FRAMES, Fault, Flight, Moment, SIGMA_PX, TAIL, error_m};
 
 const SEED: u64 = 77;
 
@@ -37,7 +37,7 @@ fn frames(flight: &Flight) -> Vec<Vec<tanker_pose::estimation::Observation>> {
 
 #[test]
 fn levels_follow_late_frames_bit_for_bit() {
-    let budget = budget(&support::tanker_markers(6));
+    let budget = example_budget(&support::tanker_markers(6));
     let flight = Flight::new(budget, &[IntegritySettings::default()]);
     let mut frames = frames(&flight);
     // A beacon is first seen in the late frame, another only before it.
@@ -175,7 +175,7 @@ fn fault_that_hardly_a_frame_shows_is_shown_by_the_track() {
 fn levels_of_the_track_are_no_larger_than_those_of_frames_without_a_budget() {
     for (what, budget) in [
         ("no budget", no_budget()),
-        ("budget", budget(&support::tanker_markers(6))),
+        ("budget", example_budget(&support::tanker_markers(6))),
     ] {
         for exposure in [1, 1800] {
             let settings = IntegritySettings {

@@ -6,7 +6,6 @@ use super::consumers::Protection;
 use super::diagnostics::Tally;
 use super::output::Output;
 use crate::convert;
-use crate::integrity::{FrameIntegrity, Unavailable};
 use crate::messages::{DiagnosticStatus, Header, Integrity, KeyValue};
 use crate::pipeline::{FrameOutcome, IntegrityState, Pipeline};
 use ros2_node::once::SaidOnce;
@@ -14,14 +13,39 @@ use ros2_node::once::SaidOnce;
 /// The output, and what became of its frames since the start.
 pub struct IntegrityOutput {
     output: Output<Integrity>,
-    counts: [u64; IntegrityState::ALL.len()],
+    of_frame: States,
+    of_track: States,
     /// Since the last report.
     frames: u64,
     /// Since the last report.
     reason: Option<String>,
+}
+
+/// How often each state was met, and what of it was logged.
+#[derive(Default)]
+struct States {
+    counts: [u64; IntegrityState::ALL.len()],
     log_gate: SaidOnce<IntegrityState>,
-    track_counts: [u64; IntegrityState::ALL.len()],
-    track_log_gate: SaidOnce<IntegrityState>,
+}
+
+impl States {
+    /// Takes a state; logs its beginning and its end. Of one without anything to protect the status says why.
+    fn take(&mut self, state: IntegrityState, of: &str, message: &str, now: Instant) {
+        self.counts[usize::from(state.number())] += 1;
+        match state {
+            IntegrityState::Available => {
+                if let Some(count) = self.log_gate.good() {
+                    log::info!("the {of} is protected again after {count} frames");
+                }
+            }
+            IntegrityState::NoPose | IntegrityState::None => {}
+            _ => {
+                if self.log_gate.fault(state, now) {
+                    log::warn!("the {of} is not protected: {message}");
+                }
+            }
+        }
+    }
 }
 
 impl IntegrityOutput {
@@ -30,12 +54,10 @@ impl IntegrityOutput {
     pub fn new(output: Output<Integrity>) -> Self {
         Self {
             output,
-            counts: [0; IntegrityState::ALL.len()],
+            of_frame: States::default(),
+            of_track: States::default(),
             frames: 0,
             reason: None,
-            log_gate: SaidOnce::default(),
-            track_counts: [0; IntegrityState::ALL.len()],
-            track_log_gate: SaidOnce::default(),
         }
     }
 
@@ -57,21 +79,17 @@ impl IntegrityOutput {
         };
         let mode = |index| pipeline.mode_name(index);
         let message = convert::integrity(header.clone(), monitor, levels, of_track, mode);
-        let state = IntegrityState::from(levels);
-        self.counts[usize::from(state.number())] += 1;
+        let (state, track_state) = (IntegrityState::from(levels), IntegrityState::from(of_track));
         self.frames += 1;
-        if state == IntegrityState::Available {
-            if let Some(count) = self.log_gate.good() {
-                log::info!("protection levels are available again after {count} frames");
-            }
-        } else {
+        self.of_frame.take(state, "pose", &message.message, now);
+        self.of_track
+            .take(track_state, "track", &message.track_message, now);
+        let is_wanting = |state| !matches!(state, IntegrityState::Available | IntegrityState::None);
+        if is_wanting(state) {
             self.reason = Some(message.message.clone());
-            // A frame without a pose is reported by the outcome of its frame.
-            if state != IntegrityState::NoPose && self.log_gate.fault(state, now) {
-                log::warn!("the pose is not protected: {}", message.message);
-            }
+        } else if is_wanting(track_state) && self.reason.is_none() {
+            self.reason = Some(format!("the track: {}", message.track_message));
         }
-        let track_state = self.on_track(&message.track_message, of_track, now);
         self.output.publish(message, tally);
         Protection {
             of_frame: state == IntegrityState::Available,
@@ -79,51 +97,21 @@ impl IntegrityOutput {
         }
     }
 
-    fn on_track(
-        &mut self,
-        message: &str,
-        levels: &Result<FrameIntegrity, Unavailable>,
-        now: Instant,
-    ) -> IntegrityState {
-        let state = IntegrityState::from(levels);
-        self.track_counts[usize::from(state.number())] += 1;
-        match state {
-            IntegrityState::Available => {
-                if let Some(count) = self.track_log_gate.good() {
-                    log::info!("the track is protected again after {count} frames");
-                }
-            }
-            // There is nothing to protect: the status says why.
-            IntegrityState::None => {}
-            _ => {
-                if self.reason.is_none() {
-                    self.reason = Some(format!("the track: {message}"));
-                }
-                if self.track_log_gate.fault(state, now) {
-                    log::warn!("the track is not protected: {message}");
-                }
-            }
-        }
-        state
-    }
-
     /// Forgets what was counted.
     pub(super) fn reset(&mut self) {
-        self.counts = [0; IntegrityState::ALL.len()];
+        self.of_frame = States::default();
+        self.of_track = States::default();
         self.frames = 0;
         self.reason = None;
-        self.log_gate = SaidOnce::default();
-        self.track_counts = [0; IntegrityState::ALL.len()];
-        self.track_log_gate = SaidOnce::default();
     }
 
     /// Returns the counts, and the last reason since the last report.
     pub(super) fn diagnostics(&mut self, node: &str) -> DiagnosticStatus {
         let reason = self.reason.take();
         let frames = std::mem::take(&mut self.frames);
-        let of_frames = IntegrityState::ALL.into_iter().zip(self.counts);
+        let of_frames = IntegrityState::ALL.into_iter().zip(self.of_frame.counts);
         let of_frames = of_frames.filter(|(state, _)| *state != IntegrityState::None);
-        let of_track = IntegrityState::ALL.into_iter().zip(self.track_counts);
+        let of_track = IntegrityState::ALL.into_iter().zip(self.of_track.counts);
         let name = |state: IntegrityState| state.name().to_ascii_lowercase();
         let values = of_frames
             .map(|(state, count)| (name(state), count))

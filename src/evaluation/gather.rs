@@ -160,11 +160,8 @@ impl Gathered {
             Role::Detections => self.on_detections(message, reader)?,
             Role::Pose => {
                 let pose: PoseWithCovarianceStamped = message.decode()?;
-                if let Some(found) = stamped(&pose.header, &pose.pose.pose, &pose.pose.covariance) {
-                    self.poses.push(found);
-                } else {
-                    self.no_pose(role);
-                }
+                let found = stamped(&pose.header, &pose.pose.pose, &pose.pose.covariance);
+                self.push_pose(role, found);
                 pose.header
             }
             Role::Odometry => {
@@ -268,15 +265,11 @@ impl Gathered {
 
     fn push_pose(&mut self, role: Role, found: Option<StampedPose>) {
         match (role, found) {
+            (_, None) => *self.not_poses.entry(role).or_default() += 1,
             (Role::Odometry, Some(found)) => self.odometry.push(found),
             (Role::Truth, Some(found)) => self.truths.push(found),
-            (_, Some(_)) => {}
-            (_, None) => self.no_pose(role),
+            (_, Some(found)) => self.poses.push(found),
         }
-    }
-
-    fn no_pose(&mut self, role: Role) {
-        *self.not_poses.entry(role).or_default() += 1;
     }
 
     fn child(&mut self, role: Role, child: String) {

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use smallvec::SmallVec;
 
-use crate::camera::Camera;
-use crate::estimation::{Estimator, Observation, Solution};
+use super::frame::SolvedFrame;
+use crate::estimation::Observation;
 
 /// rad, 10°; beyond it the error does not follow the covariance.
 const MOST_ATTITUDE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
@@ -14,18 +14,13 @@ const MOST_TURN_SIGMAS: f64 = 10.0;
 const FLAT: f64 = 0.02;
 
 /// The points of a frame without some of them.
-pub(super) struct Alone<'a> {
-    pub(super) estimator: &'a Estimator,
-    pub(super) camera: &'a Camera,
-    pub(super) observations: &'a [Observation],
-    pub(super) solution: &'a Solution,
-}
+pub(super) struct Alone<'a>(pub(super) &'a SolvedFrame<'a>);
 
 impl Alone<'_> {
     /// Returns the used points but those of these rows.
     fn without<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = &'a Observation> {
-        let used = self.observations.iter();
-        used.filter(|seen| !self.solution.excluded.contains(seen.id))
+        let used = self.0.observations.iter();
+        used.filter(|seen| !self.0.solution.excluded.contains(seen.id))
             .enumerate()
             .filter(|(at, _)| !rows.contains(&(2 * at)))
             .map(|(_, seen)| seen)
@@ -35,12 +30,12 @@ impl Alone<'_> {
     /// allow, where a fault could have led, and an attitude that is known.
     pub(super) fn fix_one_pose(&self, rows: &[usize]) -> bool {
         let others: SmallVec<[Observation; 16]> = self.without(rows).copied().collect();
-        let found = self.estimator.estimate_of_all(self.camera, &others);
+        let found = self.0.estimator.estimate_of_all(self.0.camera, &others);
         found.is_ok_and(|found| {
             let turn = found
                 .camera_from_tanker
                 .rotation
-                .angle_to(&self.solution.camera_from_tanker.rotation);
+                .angle_to(&self.0.solution.camera_from_tanker.rotation);
             let sigma = found.covariance.largest_attitude_sigma();
             found.ambiguity <= 0.0 && sigma < MOST_ATTITUDE_SIGMA && turn < MOST_TURN_SIGMAS * sigma
         })

@@ -1,9 +1,27 @@
 //! What one frame's pose is protected to, or why not.
 
 use super::hypotheses::{Beacon, Hypothesis};
+use crate::camera::Camera;
+use crate::estimation::{Estimator, Observation, Solution};
+use crate::target::MarkerMap;
 
 /// Axes of the receiver, in the order of all levels.
 pub(super) const AXES: [&str; 3] = ["ahead", "lateral", "vertical"];
+
+/// A solution with all that it came from.
+#[derive(Debug, Clone, Copy)]
+pub struct SolvedFrame<'a> {
+    /// That found it.
+    pub estimator: &'a Estimator,
+    /// Tells which points are corners of one tag; without one each is a beacon of its own.
+    pub map: Option<&'a MarkerMap>,
+    /// That saw the points.
+    pub camera: &'a Camera,
+    /// Those that the solution was estimated from, with those that it left out.
+    pub observations: &'a [Observation],
+    /// What is to be judged.
+    pub solution: &'a Solution,
+}
 
 /// The levels of one frame.
 #[derive(Debug, Clone, PartialEq)]

@@ -37,7 +37,7 @@ mod separation;
 mod track;
 
 pub use declared::{IntegrityPoint, Mount};
-pub use frame::{AboveLimit, FrameIntegrity, PointIntegrity, Unavailable};
+pub use frame::{AboveLimit, FrameIntegrity, PointIntegrity, SolvedFrame, Unavailable};
 pub use hypotheses::{Beacon, Hypothesis};
 pub use monitor::IntegrityMonitor;
 pub use track::{FrameSeparations, TrackSeparation, TrackSeparations};
@@ -71,6 +71,17 @@ impl IntegritySettings {
             self.flex_fault_probability > 0.0,
             self.calibration_fault_probability > 0.0,
         ]
+    }
+}
+
+impl IntegritySettings {
+    /// Returns the probability that a mode of the budget is beyond what its sigma allows; flex modes come first.
+    pub(crate) const fn mode_fault_probability(&self, mode: usize, flex_modes: usize) -> f64 {
+        if mode < flex_modes {
+            self.flex_fault_probability
+        } else {
+            self.calibration_fault_probability
+        }
     }
 }
 

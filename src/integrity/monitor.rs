@@ -6,23 +6,21 @@ use smallvec::SmallVec;
 use super::IntegritySettings;
 use super::alone::Alone;
 use super::declared::{IntegrityPoint, Mount, PointAxes};
-use super::frame::{AboveLimit, FrameIntegrity, PointIntegrity, Unavailable, Unmonitored};
+use super::frame::{
+    AboveLimit, FrameIntegrity, PointIntegrity, SolvedFrame, Unavailable, Unmonitored,
+};
 use super::gaussian::tail_inverse;
 use super::hypotheses::{Beacon, Hypothesis, Plan, Unit, units};
 use super::level::{Along, Risk};
-use super::projection::Projection;
-use super::search::{Axis, Frame, Search};
+use super::projection::{Projection, WIDENED};
+use super::search::{Axis, Frame, Search, VisibleFault};
 use super::separation::{Separations, Suspicion};
 use super::track::{FrameSeparations, LeftOut, Linearised};
-use crate::camera::Camera;
-use crate::estimation::{Estimator, LinearFrame, Observation, Refinement, Solution};
+use crate::estimation::{LinearFrame, Refinement, Solution};
 use crate::geometry::PoseCovariance;
-use crate::target::MarkerMap;
 
 /// Points that must remain without the suspects: three fix up to four poses.
 const LEAST_REMAINING: usize = 4;
-/// Of the variance that the curvature gives: below it, a covariance differs by the step that it was taken before.
-const WIDENED: f64 = 1.02;
 
 /// Computes protection levels of solutions.
 #[derive(Debug, Clone)]
@@ -57,73 +55,39 @@ impl IntegrityMonitor {
 
     /// Returns the protection levels of a solution.
     ///
-    /// # Inputs
-    /// * `map`: tells which points are corners of one tag; without one each is a beacon of its own.
-    /// * `observations`: those that the solution was estimated from, with those that it left out.
-    ///
     /// # Errors
     /// [`Unavailable`]: no levels can be given, or a fault is visible.
-    pub fn judge(
-        &self,
-        estimator: &Estimator,
-        map: Option<&MarkerMap>,
-        camera: &Camera,
-        observations: &[Observation],
-        solution: &Solution,
-    ) -> Result<FrameIntegrity, Unavailable> {
-        let mut unwanted = None;
-        self.examine(
-            estimator,
-            map,
-            camera,
-            observations,
-            solution,
-            &mut unwanted,
-        )
+    pub fn judge(&self, solved: &SolvedFrame) -> Result<FrameIntegrity, Unavailable> {
+        self.examine(solved, None)
     }
 
     /// Returns the protection levels of a solution, and what those of a track need of the frame: `None` where it cannot
     /// be linearised.
-    ///
-    /// # Inputs
-    /// As for [`Self::judge`].
     pub fn judge_for_track(
         &self,
-        estimator: &Estimator,
-        map: Option<&MarkerMap>,
-        camera: &Camera,
-        observations: &[Observation],
-        solution: &Solution,
+        solved: &SolvedFrame,
     ) -> (
         Result<FrameIntegrity, Unavailable>,
         Option<FrameSeparations>,
     ) {
-        let mut separations = Some(FrameSeparations::default());
-        let levels = self.examine(
+        let mut separations = FrameSeparations::default();
+        let levels = self.examine(solved, Some(&mut separations));
+        let is_linearised = separations.is_of_frame();
+        (levels, is_linearised.then_some(separations))
+    }
+
+    fn examine(
+        &self,
+        solved: &SolvedFrame,
+        for_track: Option<&mut FrameSeparations>,
+    ) -> Result<FrameIntegrity, Unavailable> {
+        let &SolvedFrame {
             estimator,
             map,
             camera,
             observations,
             solution,
-            &mut separations,
-        );
-        let is_linearised = |found: &FrameSeparations| found.is_of_frame();
-        (levels, separations.filter(is_linearised))
-    }
-
-    /// Does both.
-    ///
-    /// # Inputs
-    /// * `for_track`: is filled if it is wanted.
-    fn examine(
-        &self,
-        estimator: &Estimator,
-        map: Option<&MarkerMap>,
-        camera: &Camera,
-        observations: &[Observation],
-        solution: &Solution,
-        for_track: &mut Option<FrameSeparations>,
-    ) -> Result<FrameIntegrity, Unavailable> {
+        } = solved;
         let linear = estimator
             .linearised(camera, observations, solution)
             .ok_or(match estimator.settings().refinement {
@@ -136,7 +100,7 @@ impl IntegrityMonitor {
         };
         let units = units(&linear.ids, beacon_of);
         let plan = self.plan(units.len(), linear.flex_modes, linear.modes);
-        let left_out = left_out(estimator, observations, solution);
+        let left_out = left_out(solved);
         let allowed = self.settings.hmi_probability * left_out.share();
         let is_hopeless = plan.beyond >= allowed;
         let too_many = || Unavailable::Unmonitored {
@@ -160,16 +124,10 @@ impl IntegrityMonitor {
             modes: SmallVec::new(),
             is_monitored: Vec::with_capacity(plan.count),
             unmonitorable: 0.0,
-            fault: None,
+            fault: VisibleFault::default(),
             found: Separations::new(),
         };
-        let alone = Alone {
-            estimator,
-            camera,
-            observations,
-            solution,
-        };
-        self.visit(&units, &plan, &alone, &mut search);
+        self.visit(&units, &plan, &Alone(solved), &mut search);
         if let Some(separations) = for_track {
             let linearised = Linearised {
                 linear: &linear,
@@ -190,9 +148,7 @@ impl IntegrityMonitor {
         if is_hopeless {
             return Err(too_many());
         }
-        if let Some((_, fault)) = search.fault {
-            return Err(fault);
-        }
+        search.fault.none()?;
         let frames = f64::from(self.settings.frames);
         let parts = [
             (plan.beyond, Unmonitored::Several),
@@ -362,11 +318,9 @@ impl IntegrityMonitor {
         }
         let linear = search.frame.linear;
         for mode in 0..linear.modes {
-            let prior = if mode < linear.flex_modes {
-                self.settings.flex_fault_probability
-            } else {
-                self.settings.calibration_fault_probability
-            };
+            let prior = self
+                .settings
+                .mode_fault_probability(mode, linear.flex_modes);
             if prior > 0.0 {
                 search.mode(mode, prior);
             }
@@ -375,11 +329,11 @@ impl IntegrityMonitor {
 }
 
 /// Returns what a solution leaves out.
-fn left_out(estimator: &Estimator, observations: &[Observation], solution: &Solution) -> LeftOut {
-    let count = observations.len() as f64;
+fn left_out(solved: &SolvedFrame) -> LeftOut {
+    let count = solved.observations.len() as f64;
     LeftOut {
-        ids: solution.excluded.ids().collect(),
-        choices: match estimator.settings().max_outliers {
+        ids: solved.solution.excluded.ids().collect(),
+        choices: match solved.estimator.settings().max_outliers {
             0 => None,
             1 => Some(count),
             _ => Some(count + 0.5 * count * (count - 1.0)),

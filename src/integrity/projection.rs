@@ -20,6 +20,8 @@ use crate::estimation::LinearFrame;
 const ROWS: usize = 32;
 /// Numbers of a matrix kept without it: of twelve points.
 pub(super) const MATRIX: usize = 24 * 24;
+/// Of the variance that the curvature gives: below it, a covariance differs by the step that it was taken before.
+pub(super) const WIDENED: f64 = 1.02;
 /// The pose's own dimensions.
 const POSE: usize = 6;
 

@@ -25,6 +25,44 @@ pub(super) struct Axis {
     pub(super) widened: f64,
 }
 
+/// The fault that is most clearly visible, with its separation over the threshold.
+#[derive(Default)]
+pub(super) struct VisibleFault(Option<(f64, Unavailable)>);
+
+impl VisibleFault {
+    /// Takes a separation along an axis.
+    pub(super) fn take(
+        &mut self,
+        hypothesis: Hypothesis,
+        axis: usize,
+        separation_m: f64,
+        threshold_m: f64,
+    ) {
+        // Whatever is not a number is no agreement.
+        let agrees = separation_m <= threshold_m;
+        let ratio = separation_m / threshold_m;
+        if agrees
+            || self
+                .0
+                .is_some_and(|(worst, _)| ratio.is_nan() || ratio <= worst)
+        {
+            return;
+        }
+        let fault = Unavailable::Fault {
+            hypothesis,
+            axis,
+            separation_m,
+            threshold_m,
+        };
+        self.0 = Some((ratio, fault));
+    }
+
+    /// Returns it as the reason for no levels.
+    pub(super) fn none(self) -> Result<(), Unavailable> {
+        self.0.map_or(Ok(()), |(_, fault)| Err(fault))
+    }
+}
+
 /// What the hypotheses of a frame add up to.
 pub(super) struct Search<'a> {
     pub(super) frame: &'a Frame<'a>,
@@ -39,8 +77,7 @@ pub(super) struct Search<'a> {
     pub(super) is_monitored: Vec<bool>,
     /// Probability of faults that the points that are left could not show.
     pub(super) unmonitorable: f64,
-    /// The worst one that is visible, with its separation over the threshold.
-    pub(super) fault: Option<(f64, Unavailable)>,
+    pub(super) fault: VisibleFault,
     pub(super) found: Separations,
 }
 
@@ -77,19 +114,7 @@ impl Search<'_> {
         for (at, (axis, separation)) in self.frame.axes.iter().zip(&self.found).enumerate() {
             let threshold_m = self.quantile * separation.sigma_m;
             let by = separation.difference_m.abs();
-            // Whatever is not a number is no agreement.
-            if by > threshold_m || by.is_nan() || threshold_m.is_nan() {
-                let ratio = by / threshold_m;
-                if self.fault.is_none_or(|(worst, _)| ratio > worst) {
-                    let fault = Unavailable::Fault {
-                        hypothesis,
-                        axis: at % 3,
-                        separation_m: by,
-                        threshold_m,
-                    };
-                    self.fault = Some((ratio, fault));
-                }
-            }
+            self.fault.take(hypothesis, at % 3, by, threshold_m);
             let own = separation.sigma_m * axis.widened;
             self.along.push(Along {
                 prior,

@@ -40,7 +40,7 @@ use crate::estimation::{
     CalibrationMode, ErrorBudget, EstimateError, Estimator, Expected, Initialisation, Observation,
     ReportedAttitude,
 };
-use crate::integrity::{IntegrityMonitor, Unavailable};
+use crate::integrity::{IntegrityMonitor, SolvedFrame, Unavailable};
 use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
 
@@ -374,13 +374,13 @@ impl Pipeline {
         let mut outcome = solve_expecting(&self.estimator, camera, &observations, &expected);
         outcome.widened_by = widened_by;
         if let (Some(monitor), Ok(solution)) = (&self.integrity, &outcome.result) {
-            let (levels, separations) = monitor.judge_for_track(
-                &self.estimator,
-                Some(&self.map),
+            let (levels, separations) = monitor.judge_for_track(&SolvedFrame {
+                estimator: &self.estimator,
+                map: Some(&self.map),
                 camera,
-                &observations,
+                observations: &observations,
                 solution,
-            );
+            });
             outcome.integrity = Some(levels);
             outcome.separations = separations.map(Box::new);
         }

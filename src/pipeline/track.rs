@@ -80,6 +80,7 @@ impl Tracker {
             _ => filter.predict(stamp_ns).ok(),
         };
     }
+
     /// Returns the protection levels of the track at a frame's stamp.
     pub(super) fn protection(
         &self,

@@ -3,13 +3,12 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rand::RngExt;
 use rayon::prelude::*;
-use tanker_pose::camera::CalibrationChange;
-use tanker_pose::estimation::{
-    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Solution,
-};
+use tanker_pose::estimation::{ErrorBudget, Estimator, EstimatorSettings, Solution};
 use tanker_pose::geometry::{pose_error, skew};
 use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
 use tanker_pose::target::Marker;
+
+use crate::budgets::{calibration_mode, calibration_modes, wing_bending};
 
 const TRIALS: u32 = 2000;
 pub const SEED: u64 = 11;
@@ -45,34 +44,11 @@ pub const EVERYTHING: Causes = Causes {
 impl Causes {
     pub fn budget(&self, markers: &[Marker]) -> ErrorBudget {
         let survey: Vec<(u32, f64)> = markers.iter().map(|m| (m.id, self.survey_m)).collect();
-        let bend = |marker: &Marker| {
-            let up = self.flex_m * (marker.marker_in_tanker.y / 7.13).powi(2);
-            (marker.id, Vector3::new(0.0, 0.0, up))
-        };
-        let flex = FlexMode {
-            name: "wing_bending".to_owned(),
-            time_constant_s: None,
-            shape: markers.iter().map(bend).collect(),
-        };
-        let calibration = [
-            ("focal_length", [0, 1].as_slice(), self.focal),
-            ("principal_point_u", &[2], self.principal_point_px),
-            ("principal_point_v", &[3], self.principal_point_px),
-            ("k1", &[4], self.k1),
-        ]
-        .into_iter()
-        .filter(|(_, _, sigma)| *sigma > 0.0)
-        .map(|(name, places, sigma)| {
-            let mut change = CalibrationChange::zeros();
-            for &place in places {
-                change[place] = sigma;
-            }
-            CalibrationMode {
-                name: name.to_owned(),
-                change,
-            }
-        })
-        .collect();
+        let places = markers.iter().map(|m| (m.id, m.marker_in_tanker.y));
+        let flex = wing_bending(places, self.flex_m, 7.13, None);
+        let mut calibration = calibration_modes(self.focal, self.principal_point_px);
+        calibration.push(calibration_mode("k1", &[4], self.k1));
+        calibration.retain(|mode| mode.change.amax() > 0.0);
         let flex = if self.flex_m > 0.0 {
             vec![flex]
         } else {

@@ -3,10 +3,15 @@
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tanker_pose::camera::{CalibrationChange, Camera, CameraInfo};
-use tanker_pose::estimation::{CalibrationMode, ErrorBudget, FlexMode, Observation};
+use tanker_pose::camera::{Camera, CameraInfo};
+use tanker_pose::estimation::{ErrorBudget, Observation};
 use tanker_pose::simulation::{Scene, paper_scene, pose_in_camera};
 use tanker_pose::target::Marker;
+
+use budgets::{calibration_mode, calibration_modes, wing_bending};
+
+#[path = "../budgets/mod.rs"]
+mod budgets;
 
 /// Noise of the detections, px.
 pub const SIGMA_PX: f64 = 0.5;
@@ -55,30 +60,9 @@ pub fn survey(seen: &[Observation]) -> Vec<(u32, f64)> {
 
 /// Returns a budget with every cause: survey, flex, calibration and jitter.
 pub fn full_budget(seen: &[Observation]) -> ErrorBudget {
-    let calibration = |name: &str, places: &[usize], sigma: f64| {
-        let mut change = CalibrationChange::zeros();
-        for &place in places {
-            change[place] = sigma;
-        }
-        CalibrationMode {
-            name: name.to_owned(),
-            change,
-        }
-    };
-    let bend = |seen: &Observation| {
-        let up = 0.3 * (seen.marker_in_tanker.y / 7.0).powi(2);
-        (seen.id, Vector3::new(0.0, 0.0, up))
-    };
-    let flex = FlexMode {
-        name: "wing_bending".to_owned(),
-        time_constant_s: Some(5.0),
-        shape: seen.iter().map(bend).collect(),
-    };
-    let calibration = vec![
-        calibration("focal_length", &[0, 1], 0.003),
-        calibration("principal_point_u", &[2], 3.0),
-        calibration("principal_point_v", &[3], 3.0),
-        calibration("k1", &[4], 0.02),
-    ];
+    let places = seen.iter().map(|seen| (seen.id, seen.marker_in_tanker.y));
+    let flex = wing_bending(places, 0.3, 7.0, Some(5.0));
+    let mut calibration = calibration_modes(0.003, 3.0);
+    calibration.push(calibration_mode("k1", &[4], 0.02));
     ErrorBudget::new(&survey(seen), vec![flex], calibration, 0.5).expect("a budget")
 }

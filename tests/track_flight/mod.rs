@@ -9,19 +9,17 @@ use nalgebra::{
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tanker_pose::camera::{CalibrationChange, Camera};
-use tanker_pose::estimation::{
-    CalibrationMode, ErrorBudget, Estimator, EstimatorSettings, FlexMode, Observation,
-};
+use tanker_pose::camera::Camera;
+use tanker_pose::estimation::{ErrorBudget, Estimator, EstimatorSettings, Observation};
 use tanker_pose::frames::flu_from_optical;
 use tanker_pose::geometry::{Motion, PoseCovariance, skew};
 use tanker_pose::integrity::{
-    FrameIntegrity, IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount, TrackSeparations,
-    Unavailable,
+    FrameIntegrity, IntegrityMonitor, IntegrityPoint, IntegritySettings, Mount, SolvedFrame,
+    TrackSeparations, Unavailable,
 };
 use tanker_pose::pipeline::{FrameErrors, solve};
 use tanker_pose::simulation::{World, paper_camera, pose_in_camera, trial_generator};
-use tanker_pose::target::{Marker, MarkerMap};
+use tanker_pose::target::MarkerMap;
 use tanker_pose::tracking::{Filter, FilterSettings};
 
 use crate::support::tanker_markers;
@@ -166,13 +164,13 @@ impl Flight {
             filter.miss(stamp_ns);
             return None;
         };
-        let (levels, separations) = self.monitors[0].judge_for_track(
-            &self.estimator,
-            Some(&self.map),
-            &self.camera,
-            seen,
+        let (levels, separations) = self.monitors[0].judge_for_track(&SolvedFrame {
+            estimator: &self.estimator,
+            map: Some(&self.map),
+            camera: &self.camera,
+            observations: seen,
             solution,
-        );
+        });
         let has_causes = self.estimator.has_causes();
         let errors = FrameErrors::new(solution, outcome.causes.as_ref(), has_causes);
         filter.update_followed(
@@ -286,38 +284,4 @@ pub fn monitor(settings: IntegritySettings) -> IntegrityMonitor {
         mount,
         vec![point("origin", Point3::origin()), point("tail", TAIL)],
     )
-}
-
-pub fn no_budget() -> ErrorBudget {
-    ErrorBudget::new(&[], vec![], vec![], 0.0).expect("nothing is wrong with nothing")
-}
-
-/// A budget as the example of a map with one has it, and of a calibration.
-pub fn budget(markers: &[Marker]) -> ErrorBudget {
-    let survey: Vec<(u32, f64)> = markers.iter().map(|marker| (marker.id, 0.01)).collect();
-    let bend = |marker: &Marker| {
-        let up = 0.2 * (marker.marker_in_tanker.y / 7.13).powi(2);
-        (marker.id, Vector3::new(0.0, 0.0, up))
-    };
-    let flex = FlexMode {
-        name: "wing_bending".to_owned(),
-        time_constant_s: Some(4.0),
-        shape: markers.iter().map(bend).collect(),
-    };
-    let calibration = [
-        ("focal_length", [0, 1].as_slice(), 0.001),
-        ("principal_point_u", &[2], 1.0),
-        ("principal_point_v", &[3], 1.0),
-    ]
-    .map(|(name, places, sigma)| {
-        let mut change = CalibrationChange::zeros();
-        for &place in places {
-            change[place] = sigma;
-        }
-        CalibrationMode {
-            name: name.to_owned(),
-            change,
-        }
-    });
-    ErrorBudget::new(&survey, vec![flex], calibration.to_vec(), 0.3).expect("a budget")
 }

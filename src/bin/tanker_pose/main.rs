@@ -10,6 +10,8 @@ mod options;
 mod parameters;
 mod plot;
 #[cfg(feature = "bags")]
+mod recording_codes;
+#[cfg(feature = "bags")]
 mod replay;
 mod reproduce;
 #[cfg(any(feature = "ros", feature = "bags"))]

@@ -6,11 +6,8 @@ use smallvec::SmallVec;
 use super::choices::LeftOut;
 use crate::estimation::{ErrorBudget, LinearFrame, Solution};
 use crate::integrity::hypotheses::{Beacon, Unit};
-use crate::integrity::projection::{Projection, dot, factor, forward};
+use crate::integrity::projection::{Projection, WIDENED, dot, factor, forward};
 use crate::integrity::separation::{Suspicion, is_visible};
-
-/// Of the variance that the curvature gives: below it, a covariance differs by the step that it was taken before.
-const WIDENED: f64 = 1.02;
 
 /// A cause that frames have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -96,12 +96,10 @@ impl Separated {
                 let mut of_measured = Matrix12x6::zeros();
                 of_measured.fill_diagonal(1.0);
                 found.add(&of_measured, effect);
-                if let Some(size) = std::num::NonZero::new(effect.lever.len()) {
-                    let by_cause = effect.by_cause.chunks_exact(size.get());
-                    found.by_cause = by_cause
-                        .map(|b| of_measured * moved(&effect.lever, b))
-                        .collect();
-                }
+                let by_cause = effect.by_cause.chunks_exact(effect.lever.len().max(1));
+                found.by_cause = by_cause
+                    .map(|b| of_measured * moved(&effect.lever, b))
+                    .collect();
             }
         }
         found
@@ -132,11 +130,7 @@ impl Separated {
             Seen::Pose(effect) => Some(effect),
             Seen::Same | Seen::Nothing => None,
         };
-        let mut levers: SmallVec<[Vector12; 4]> = SmallVec::new();
-        if let Some(effect) = effect {
-            self.add(gain, effect);
-            levers.extend(effect.lever.iter().map(|lever| gain * lever));
-        }
+        let levers = effect.map_or_else(SmallVec::new, |effect| self.add(gain, effect));
         self.by_cause.clear();
         for (at, cause) in causes.iter().enumerate() {
             let by = before.by_cause.get(at);
@@ -160,8 +154,8 @@ impl Separated {
         }
     }
 
-    /// Adds what is new in a frame.
-    fn add(&mut self, gain: &Matrix12x6, effect: &Effect) {
+    /// Adds what is new in a frame; returns `G L`.
+    fn add(&mut self, gain: &Matrix12x6, effect: &Effect) -> SmallVec<[Vector12; 4]> {
         let size = effect.lever.len();
         let levers: SmallVec<[Vector12; 4]> =
             effect.lever.iter().map(|lever| gain * lever).collect();
@@ -176,6 +170,7 @@ impl Separated {
             self.more.ger(1.0, lever, &(weighted - cross), 1.0);
             self.more.ger(-1.0, &cross, lever, 1.0);
         }
+        levers
     }
 
     /// Leaves the track without the suspects as it is predicted.

@@ -9,6 +9,7 @@ use crate::geometry::{Matrix12, Motion, Vector12};
 use crate::integrity::frame::{FrameIntegrity, Unavailable, Unmonitored};
 use crate::integrity::level::Along;
 use crate::integrity::monitor::IntegrityMonitor;
+use crate::integrity::search::VisibleFault;
 
 /// One axis of a point, in errors of the track at its last frame.
 struct Direction {
@@ -52,7 +53,7 @@ impl IntegrityMonitor {
         let mut along = Vec::with_capacity(plan.count * directions.len());
         let mut hypotheses = Vec::with_capacity(plan.count);
         let mut unmonitorable = 0.0;
-        let mut fault: Option<(f64, Unavailable)> = None;
+        let mut fault = VisibleFault::default();
         for (suspects, separated) in &followed.hypotheses {
             let prior = self.prior(*suspects, followed.flex_modes);
             if !separated.is_known() {
@@ -74,19 +75,7 @@ impl IntegrityMonitor {
                 }
                 let threshold_m = quantile * of_separation.sqrt();
                 let separation_m = a.dot(&separated.difference).abs();
-                // Whatever is not a number is no agreement.
-                if separation_m > threshold_m || separation_m.is_nan() || threshold_m.is_nan() {
-                    let ratio = separation_m / threshold_m;
-                    if fault.is_none_or(|(worst, _)| ratio > worst) {
-                        let found = Unavailable::Fault {
-                            hypothesis,
-                            axis: at % 3,
-                            separation_m,
-                            threshold_m,
-                        };
-                        fault = Some((ratio, found));
-                    }
-                }
+                fault.take(hypothesis, at % 3, separation_m, threshold_m);
                 along.push(Along {
                     prior,
                     threshold_m,
@@ -95,9 +84,7 @@ impl IntegrityMonitor {
                 });
             }
         }
-        if let Some((_, fault)) = fault {
-            return Err(fault);
-        }
+        fault.none()?;
         let frames = f64::from(self.settings().frames);
         let parts = [
             (plan.beyond, Unmonitored::Several),
@@ -117,8 +104,7 @@ impl IntegrityMonitor {
         match suspects {
             Suspects::One(_) => settings.fault_probability,
             Suspects::Two(..) => settings.fault_probability.powi(2),
-            Suspects::Mode(mode) if mode < flex_modes => settings.flex_fault_probability,
-            Suspects::Mode(_) => settings.calibration_fault_probability,
+            Suspects::Mode(mode) => settings.mode_fault_probability(mode, flex_modes),
         }
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Matrix3x6, RowVector6};
 use tanker_pose::estimation::{Estimator, Expected, Observation, Solution};
 use tanker_pose::geometry::{PoseCovariance, skew};
+use tanker_pose::integrity::SolvedFrame;
 use tanker_pose::pipeline;
 
 use super::situation::Situation;
@@ -83,8 +84,14 @@ pub fn view(
     let camera = &situation.camera;
     let outcome = pipeline::solve(estimator, camera, observations, None);
     let solution = outcome.result.map_err(|refusal| refusal.to_string())?;
-    let (monitor, map) = (&situation.monitor, Some(&situation.map));
-    let judged = monitor.judge(estimator, map, camera, observations, &solution);
+    let monitor = &situation.monitor;
+    let judged = monitor.judge(&SolvedFrame {
+        estimator,
+        map: Some(&situation.map),
+        camera,
+        observations,
+        solution: &solution,
+    });
     let mode = |index: usize| {
         let name = estimator
             .budget()

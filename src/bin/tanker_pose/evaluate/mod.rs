@@ -13,15 +13,9 @@ use tanker_pose::evaluation::{
 };
 use tanker_pose::recording::{OpenError, Recording};
 
+use crate::recording_codes::{IN_PART, NOTHING, WHOLE};
 use crate::ros_options::RosOptions;
 use files::{Job, WriteError};
-
-/// All was read.
-const WHOLE: u8 = 0;
-/// Some of it could not be read or used.
-const IN_PART: u8 = 1;
-/// Nothing could be evaluated.
-const NOTHING: u8 = 2;
 
 /// Judge recordings: errors against a truth, honesty of the covariance, protection levels, refusals, residuals, delays.
 ///
@@ -118,13 +112,7 @@ fn evaluate(arguments: &Arguments) -> Result<u8, Error> {
         });
     }
     if jobs.len() > 1 && !reports.is_empty() {
-        let fleet = FleetReport::of(&reports, failed);
-        files::write_summary(&fleet, &output)?;
-        println!(
-            "{}: {}",
-            output.join(files::SUMMARY_PAGE).display(),
-            fleet.in_words()
-        );
+        sum_up(&reports, failed, &output)?;
     }
     Ok(overall(&codes))
 }
@@ -157,14 +145,17 @@ fn summarise(paths: &[PathBuf], output: &Path) -> Result<u8, Error> {
         return Err(Error::NoReport);
     }
     let code = if failed.is_empty() { WHOLE } else { IN_PART };
-    let fleet = FleetReport::of(&reports, failed);
-    files::write_summary(&fleet, output)?;
-    println!(
-        "{}: {}",
-        output.join(files::SUMMARY_PAGE).display(),
-        fleet.in_words()
-    );
+    sum_up(&reports, failed, output)?;
     Ok(code)
+}
+
+/// Writes the summary over reports, and says where it is.
+fn sum_up(reports: &[Report], failed: Vec<FailedBag>, output: &Path) -> Result<(), WriteError> {
+    let fleet = FleetReport::of(reports, failed);
+    files::write_summary(&fleet, output)?;
+    let page = output.join(files::SUMMARY_PAGE);
+    println!("{}: {}", page.display(), fleet.in_words());
+    Ok(())
 }
 
 fn one(job: &Job, settings: &Settings) -> Result<Report, Error> {

@@ -12,14 +12,8 @@ use ros2_node::arguments::ArgumentError;
 use tanker_pose::recording::{OpenError, Recording, WriteError, Writer};
 use tanker_pose::replay::{Replay, ReplayError, Summary};
 
+use crate::recording_codes::{IN_PART, NOTHING, WHOLE};
 use crate::ros_options::RosOptions;
-
-/// All was read, and every frame has its answer.
-const WHOLE: u8 = 0;
-/// Some of it could not be read or used.
-const IN_PART: u8 = 1;
-/// Nothing could be answered.
-const NOTHING: u8 = 2;
 
 /// Answer a recording as the node would, without ROS: poses, status and all else into an MCAP file.
 ///

@@ -16,7 +16,7 @@ use indicatif::ProgressBar;
 use nalgebra::{Point3, Rotation3};
 use tanker_pose::camera::{CalibrationBudget, Camera, CameraError, CameraInfo};
 use tanker_pose::estimation::Estimator;
-use tanker_pose::integrity::{IntegrityMonitor, Unavailable};
+use tanker_pose::integrity::{IntegrityMonitor, SolvedFrame, Unavailable};
 use tanker_pose::pipeline::{
     self, Detection, FrameOutcome, ImageEdges, Refusal, integrity_monitor, modes_of_file, observe,
 };
@@ -296,8 +296,13 @@ impl Solver {
         .without(left_out);
         outcome.integrity = self.integrity.as_ref().map(|monitor| {
             let solution = outcome.result.as_ref().map_err(|_| Unavailable::NoPose)?;
-            let map = self.map.as_ref();
-            monitor.judge(&self.estimator, map, &camera, &observations, solution)
+            monitor.judge(&SolvedFrame {
+                estimator: &self.estimator,
+                map: self.map.as_ref(),
+                camera: &camera,
+                observations: &observations,
+                solution,
+            })
         });
         if let Ok(solution) = &outcome.result {
             self.previous_rotation =
