@@ -31,7 +31,7 @@ pub fn listener(offset: u32) -> RosNode {
     let environment = Environment {
         domain_id: domain(offset),
         discovery_range: DiscoveryRange::Localhost,
-        warnings: Vec::new(),
+        ..Environment::default()
     };
     RosNode::open(
         "listener",

@@ -28,6 +28,16 @@ impl DiscoveryRange {
     }
 }
 
+/// How a reply names the request that it answers: what DDS leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ServiceMapping {
+    /// Beside the data, as `rmw_fastrtps` and `rmw_connextdds` do.
+    #[default]
+    Beside,
+    /// In front of the data, as `rmw_cyclonedds` does.
+    InFront,
+}
+
 /// The checked environment.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Environment {
@@ -35,6 +45,8 @@ pub struct Environment {
     pub domain_id: u16,
     /// The range of discovery.
     pub discovery_range: DiscoveryRange,
+    /// The convention of the clients of services.
+    pub service_mapping: ServiceMapping,
     /// Settings that are understood but cannot be honoured, for the log.
     pub warnings: Vec<String>,
 }
@@ -131,6 +143,22 @@ impl Environment {
                 });
             }
         };
+        // Not to choose a middleware, which is part of this program, but whom it talks to.
+        let mut service_mapping = ServiceMapping::default();
+        match get("RMW_IMPLEMENTATION")?.as_deref() {
+            None
+            | Some("rmw_fastrtps_cpp" | "rmw_fastrtps_dynamic_cpp" | "rmw_connextdds") => {}
+            Some("rmw_cyclonedds_cpp") => service_mapping = ServiceMapping::InFront,
+            Some("rmw_zenoh_cpp") => warnings.push(
+                "RMW_IMPLEMENTATION is rmw_zenoh_cpp, but this node talks DDS: nodes on Zenoh and this one \
+                 do not hear each other"
+                    .to_owned(),
+            ),
+            Some(other) => warnings.push(format!(
+                "RMW_IMPLEMENTATION is {other}, which is unknown here: topics reach it if it is DDS, services \
+                 answer as for rmw_fastrtps_cpp"
+            )),
+        }
         if get("ROS_SECURITY_ENABLE")?.as_deref() == Some("true") {
             if get("ROS_SECURITY_STRATEGY")?.as_deref() == Some("Enforce") {
                 return Err(EnvironmentError::SecurityEnforced);
@@ -152,6 +180,7 @@ impl Environment {
         Ok(Self {
             domain_id,
             discovery_range,
+            service_mapping,
             warnings,
         })
     }
@@ -212,6 +241,21 @@ mod tests {
                 DiscoveryRange::Localhost,
                 "{asked:?}"
             );
+        }
+    }
+
+    #[test]
+    fn requests_are_named_as_the_clients_middleware_does_and_others_are_warned_of() {
+        let of = |name| environment(&[("RMW_IMPLEMENTATION", name)]).expect("no name is an error");
+        for (name, mapping, warnings) in [
+            ("rmw_fastrtps_cpp", ServiceMapping::Beside, 0),
+            ("rmw_cyclonedds_cpp", ServiceMapping::InFront, 0),
+            ("rmw_zenoh_cpp", ServiceMapping::Beside, 1),
+            ("rmw_smoke_signals", ServiceMapping::Beside, 1),
+        ] {
+            let found = of(name);
+            assert_eq!(found.service_mapping, mapping, "{name}");
+            assert_eq!(found.warnings.len(), warnings, "{:?}", found.warnings);
         }
     }
 

@@ -24,7 +24,7 @@
 //! newest                             skipping samples beyond a topic's depth
 //! graph, discovered, running_nodes   the other endpoints of topics; nodes found by what they publish
 //! supervisor                         what systemd is told
-//! logging, once                      log lines as ROS has them; lasting conditions are logged once
+//! logging, flood, once               log lines as ROS has them, not too many; lasting conditions are logged once
 //! text, text_file                    foreign text in messages; files from outside
 //! ```
 //!
@@ -52,6 +52,8 @@ pub mod discovered;
 pub mod distribution;
 #[cfg(feature = "client")]
 pub mod environment;
+#[cfg(feature = "client")]
+mod flood;
 #[cfg(feature = "client")]
 pub mod leave;
 #[cfg(feature = "client")]

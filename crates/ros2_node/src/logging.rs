@@ -4,8 +4,8 @@
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{OnceLock, PoisonError, RwLock};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::sync::{Mutex, OnceLock, PoisonError, RwLock};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
 use ros2_client::builtin_interfaces::Time;
@@ -13,6 +13,7 @@ use ros2_client::ros2::LogLevel;
 use ros2_client::{NodeLoggingHandle, RosoutRaw};
 
 use super::arguments::Arguments;
+use super::flood::Flood;
 use super::names::NodeNames;
 use crate::text;
 
@@ -45,6 +46,8 @@ struct NodeLog {
     own: &'static str,
     rosout: RwLock<Option<NodeLoggingHandle>>,
     leaving: AtomicBool,
+    /// Of errors and warnings of other crates; who asks for more of them gets it.
+    flood: Mutex<Flood>,
 }
 
 /// Starts logging for the node of this name. What `--log-level` says goes before `RUST_LOG`, and that
@@ -66,6 +69,7 @@ pub fn start(arguments: &Arguments, names: &NodeNames, own: &'static str) {
         own,
         rosout: RwLock::new(None),
         leaving: AtomicBool::new(false),
+        flood: Mutex::new(Flood::new()),
     };
     let level = logger.console.filter();
     if LOGGER.set(logger).is_ok()
@@ -196,10 +200,11 @@ impl Log for NodeLog {
         if record.target() == source && record.args().to_string().contains(wrong_type) {
             return;
         }
-        if self.console_on {
+        let is_own = is_own(record.target(), self.own);
+        if self.console_on && (is_own || self.is_shown(record)) {
             self.console.log(record);
         }
-        if !is_own(record.target(), self.own) {
+        if !is_own {
             return;
         }
         let rosout = self.rosout.read().unwrap_or_else(PoisonError::into_inner);
@@ -218,6 +223,33 @@ impl Log for NodeLog {
 
     fn flush(&self) {
         self.console.flush();
+    }
+}
+
+impl NodeLog {
+    /// Returns whether a line of another crate is shown; says before it how many were not.
+    fn is_shown(&self, record: &Record) -> bool {
+        if record.level() > Level::Warn {
+            return true;
+        }
+        let mut flood = self.flood.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(withheld) = flood.take(Instant::now()) else {
+            return false;
+        };
+        drop(flood);
+        if withheld > 0 {
+            let words = format_args!(
+                "{withheld} more errors and warnings of the middleware were left out of this log"
+            );
+            self.console.log(
+                &Record::builder()
+                    .level(Level::Warn)
+                    .target(KIT)
+                    .args(words)
+                    .build(),
+            );
+        }
+        true
     }
 }
 

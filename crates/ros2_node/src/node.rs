@@ -335,7 +335,7 @@ mod tests {
         Environment {
             domain_id: 20 + u16::try_from(std::process::id() % 40).expect("below 40"),
             discovery_range: DiscoveryRange::Localhost,
-            warnings: Vec::new(),
+            ..Environment::default()
         }
     }
 

@@ -26,7 +26,7 @@ pub use ros2_client::{NodeOptions, Publisher, QosProfile, Subscription};
 
 use super::arguments::Arguments;
 use super::discovered::{OwnEnd, graph_of, type_on_the_wire};
-use super::environment::Environment;
+use super::environment::{Environment, ServiceMapping};
 use super::graph::Graph;
 use super::leave::Farewell;
 use super::messages::Message;
@@ -154,6 +154,7 @@ pub struct RosNode {
     qos_overrides: QosOverrides,
     own_ends: Vec<OwnEnd>,
     farewell: Farewell,
+    service_mapping: ServiceMapping,
 }
 
 impl RosNode {
@@ -192,6 +193,7 @@ impl RosNode {
             qos_overrides: QosOverrides::default(),
             own_ends: Vec::new(),
             farewell,
+            service_mapping: environment.service_mapping,
         })
     }
 
@@ -300,6 +302,11 @@ impl RosNode {
         participant.assert_liveliness().map_err(|_| MiddlewareGone)
     }
 
+    /// How replies of services name their request.
+    pub(super) const fn service_mapping(&self) -> ServiceMapping {
+        self.service_mapping
+    }
+
     /// The client library's node, and the participant that it is part of, for endpoints of other kinds.
     pub(super) fn parts(&mut self) -> (&mut Node, DomainParticipant) {
         let participant = self.context.domain_participant();
@@ -360,7 +367,7 @@ mod tests {
         Environment {
             domain_id: 60 + u16::try_from(std::process::id() % 40).expect("below 40"),
             discovery_range: DiscoveryRange::Localhost,
-            warnings: Vec::new(),
+            ..Environment::default()
         }
     }
 

@@ -8,6 +8,9 @@
 //! bookkeeping holds.
 //!
 //! What that costs: a long reply is not repeated when it is lost on the way.
+//!
+//! Where the identity stands is not part of DDS. Fast DDS has it in the inline `QoS`, beside the data. The ROS layer of
+//! Cyclone DDS has 16 bytes in front of the data, which the reply repeats ([`ServiceMapping`]).
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -24,9 +27,10 @@ use ros2_client::dds::rustdds::{
 };
 use ros2_client::qos::WhenFull;
 use ros2_client::{MessageInfo, RmwRequestId, Subscription};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
+use super::environment::ServiceMapping;
 use super::once::SaidOnce;
 use super::participant::{EndpointError, QosProfile, RosNode, reliable};
 use super::rtps::{self, Data, GuidBytes, Packet};
@@ -51,9 +55,42 @@ const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// One service: its requests come in here, and its replies go out.
 pub struct Service<Request> {
     name: String,
-    requests: Subscription<Request>,
+    requests: Requests<Request>,
     replies: Replies,
     bad_requests: SaidOnce<()>,
+}
+
+/// Requests, by where their identity stands.
+enum Requests<Request> {
+    Beside(Subscription<Request>),
+    InFront(Subscription<Headed<Request>>),
+}
+
+/// A request behind its identity: the client's, and the request's number.
+#[derive(Deserialize)]
+struct Headed<Request> {
+    identity: Header,
+    request: Request,
+}
+
+/// What Cyclone DDS has in front of the data of requests and replies.
+type Header = [u64; 2];
+
+/// Whom a reply is for.
+#[derive(Debug, Clone, Copy, Default)]
+struct Asker {
+    id: RmwRequestId,
+    header: Option<Header>,
+}
+
+impl Asker {
+    /// Returns one that no client is, in the same convention.
+    fn nobody(self) -> Self {
+        Self {
+            id: RmwRequestId::default(),
+            header: self.header.map(|_| Header::default()),
+        }
+    }
 }
 
 impl<Request: DeserializeOwned + 'static> Service<Request> {
@@ -70,6 +107,7 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
             topic: name.to_owned(),
             source,
         };
+        let mapping = ros.service_mapping();
         let (node, participant) = ros.parts();
         let qos = QosPolicies::from(&SERVICE);
         let topic = |prefix: &str, part: &str, suffix: &str| {
@@ -90,9 +128,14 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
             })
             .map_err(|source| refused(source.into()))?;
         // Requests last: what arrives can be answered.
-        let requests = node
-            .create_subscription(&topic("rq", "Request", "Request")?, None)
-            .map_err(refused)?;
+        let topic = topic("rq", "Request", "Request")?;
+        let requests = match mapping {
+            ServiceMapping::Beside => node.create_subscription(&topic, None).map(Requests::Beside),
+            ServiceMapping::InFront => node
+                .create_subscription(&topic, None)
+                .map(Requests::InFront),
+        }
+        .map_err(refused)?;
         Ok(Self {
             name: name.to_owned(),
             requests,
@@ -137,13 +180,25 @@ impl<Request: DeserializeOwned + 'static> Service<Request> {
             mut replies,
             mut bad_requests,
         } = self;
-        let requests = requests.async_stream();
+        let requests = match &requests {
+            Requests::Beside(requests) => requests
+                .async_stream()
+                .map(|taken| taken.map(|(request, info)| (None, request, info)))
+                .left_stream(),
+            Requests::InFront(requests) => requests
+                .async_stream()
+                .map(|taken| {
+                    taken.map(|(headed, info)| (Some(headed.identity), headed.request, info))
+                })
+                .right_stream(),
+        };
         pin_mut!(requests);
         loop {
             match requests.select_next_some().await {
-                Ok((request, info)) => {
+                Ok((header, request, info)) => {
+                    let id = identity(&info);
                     let response = answer(request).await;
-                    if let Err(error) = replies.send(identity(&info), &response).await {
+                    if let Err(error) = replies.send(Asker { id, header }, &response).await {
                         log::warn!("service {name}: {error}");
                     }
                 }
@@ -202,23 +257,25 @@ struct Replies {
 impl Replies {
     async fn send<Response: Serialize + Default>(
         &mut self,
-        request: RmwRequestId,
+        asker: Asker,
         response: &Response,
     ) -> Result<(), ReplyError> {
-        let payload = encode(response)?;
+        let payload = encode(asker.header, response)?;
         let length = payload.len();
-        let readers = self.readers_of(request).await;
+        let readers = self.readers_of(asker.id).await;
         if length <= SHORT_BYTES {
-            return self.write(request, payload).await;
+            return self.write(asker.id, payload).await;
         }
-        let nothing = encode(&Response::default())?;
+        let nothing = Response::default();
         if length > LONGEST_BYTES {
-            self.write(request, nothing).await?;
+            let payload = encode(asker.header, &nothing)?;
+            self.write(asker.id, payload).await?;
             return Err(ReplyError::TooLong { length });
         }
-        let sent = self.send_datagrams(request, &readers, &payload);
-        // Addressed to no client: none has this identity.
-        self.write(RmwRequestId::default(), nothing).await?;
+        let sent = self.send_datagrams(asker.id, &readers, &payload);
+        let nobody = asker.nobody();
+        self.write(nobody.id, encode(nobody.header, &nothing)?)
+            .await?;
         sent.map_err(|reason| ReplyError::Datagram { length, reason })
     }
 
@@ -316,9 +373,15 @@ impl Replies {
     }
 }
 
-fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, ReplyError> {
+fn encode<T: Serialize>(header: Option<Header>, value: &T) -> Result<Vec<u8>, ReplyError> {
     let mut bytes = Vec::new();
-    serialization::to_writer_with_rep_id(&mut bytes, value, Encoded::output_encoding())
+    let encoding = Encoded::output_encoding();
+    // The alignment of what follows 16 bytes is that of what stands alone.
+    header
+        .map_or(Ok(()), |header| {
+            serialization::to_writer_with_rep_id(&mut bytes, &header, encoding)
+        })
+        .and_then(|()| serialization::to_writer_with_rep_id(&mut bytes, value, encoding))
         .map_err(|error| ReplyError::Encode(error.to_string()))?;
     Ok(bytes)
 }
