@@ -199,7 +199,8 @@ impl World {
             &self.frames,
             &self.settings,
         )
-        .unwrap_or_else(|error| panic!("seed {}: {error}", self.seed))
+        .map_err(|error| format!("seed {}: {error}", self.seed))
+        .expect("the data are good")
     }
 
     /// Returns the errors of the written markers, three rows each.
