@@ -28,7 +28,7 @@ pub enum FlightError {
     NoCamera {
         /// The topic.
         topic: String,
-        /// Which others there are.
+        /// Which others there are, or what could not be read.
         hint: String,
     },
     /// The camera info cannot be used.
@@ -39,7 +39,7 @@ pub enum FlightError {
     NoFrame {
         /// The topic.
         topic: String,
-        /// Which others there are, or why the first one cannot.
+        /// Which others there are, or what could not be read or used.
         hint: String,
     },
 }
@@ -90,16 +90,17 @@ impl Replay {
             progress(size, passed);
         }
         reading.settle(u64::MAX);
+        let first_problem = reading.skipped.first().cloned();
         let hint = |route: Route| {
+            if let Some(words) = &first_problem {
+                return format!("; the first problem: {words}");
+            }
             let kind = route.type_name();
-            let others: Vec<&str> = topics
-                .iter()
-                .filter(|topic| topic.type_name == kind)
-                .map(|topic| topic.name.as_str())
-                .collect();
-            match others.first() {
+            match topics.iter().find(|topic| topic.type_name == kind) {
                 None => format!("; the recording has no topic of {kind}"),
-                Some(other) => format!("; of {kind} the recording has {}: use -r", clip(other)),
+                Some(other) => {
+                    format!("; of {kind} the recording has {}: use -r", clip(&other.name))
+                }
             }
         };
         let named = |wanted: fn(Route) -> bool| {
@@ -117,10 +118,7 @@ impl Replay {
         let camera = Camera::from_info(&info, reading.settings.rectified)?;
         if reading.read.is_empty() {
             let (topic, route) = named(|route| matches!(route, Route::Detections(_)));
-            let hint = reading.skipped.first().map_or_else(
-                || hint(route),
-                |first| format!("; the first problem: {first}"),
-            );
+            let hint = hint(route);
             return Err(FlightError::NoFrame { topic, hint });
         }
         let modes = match &self.files.calibration {

@@ -83,6 +83,11 @@ enum Error {
         "--intrinsics needs detections in the raw image: with `rectified` the parameters K and D that a camera file holds are not seen"
     )]
     Rectified,
+    #[error(
+        "--intrinsics has nothing to refine: no parameter of the camera has a sigma; state what may be wrong with \
+         `calibration_budget_file`, `focal_length_sigma`, `principal_point_sigma_px`, `k1_sigma` or `k2_sigma`"
+    )]
+    NoCameraSigma,
     #[error(transparent)]
     Files(#[from] files::FilesError),
 }
@@ -139,6 +144,9 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         &flight.frames,
         &settings,
     )?;
+    if arguments.intrinsics && found.camera.is_none() {
+        return Err(Error::NoCameraSigma);
+    }
     let folder = arguments.output.clone().unwrap_or_else(|| {
         let mut name = arguments
             .recording
