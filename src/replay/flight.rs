@@ -99,7 +99,10 @@ impl Replay {
             match topics.iter().find(|topic| topic.type_name == kind) {
                 None => format!("; the recording has no topic of {kind}"),
                 Some(other) => {
-                    format!("; of {kind} the recording has {}: use -r", clip(&other.name))
+                    format!(
+                        "; of {kind} the recording has {}: use -r",
+                        clip(&other.name)
+                    )
                 }
             }
         };

@@ -19,7 +19,7 @@ use crate::ros_options::RosOptions;
 ///
 /// Topics, remaps and parameters are the node's, as in `replay`: -r from:=to, -p, --params-file after --ros-args. What is
 /// believed and how well comes from the marker map (`sigma`) and from the parameters of the error budget. Writes map.yaml,
-/// parameters.yaml and report.json into the output folder; camera.yaml with --intrinsics, calibration_budget.yaml where
+/// parameters.yaml and report.json into the output folder; camera.yaml with --intrinsics, `calibration_budget.yaml` where
 /// the camera has sigmas. Exit code: 0 if something was refined, 1 if the data support nothing of it, 2 on an error.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
