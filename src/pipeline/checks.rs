@@ -1,6 +1,7 @@
 //! Checks of the input before any computation.
 
 use nalgebra::Point3;
+use smallvec::SmallVec;
 
 use super::refusal::{MAX_SIGMA_PX, MIN_SIGMA_PX, Refusal};
 use super::{Detection, Stamp};
@@ -10,6 +11,8 @@ use crate::text::MAX_NAME_BYTES;
 
 /// px; limit of pixels if the image size is unknown.
 const MAX_PIXEL: f64 = 1e5;
+/// Most detections of a frame that are checked without the heap.
+pub const MOST_INLINE_DETECTIONS: usize = 64;
 
 pub(super) fn check_stamp(stamp: Stamp) -> Result<(), Refusal> {
     let is_zero = stamp.sec == 0 && stamp.nanosec == 0;
@@ -58,30 +61,30 @@ pub fn observe(
     let observations = detections
         .iter()
         .map(|seen| {
-            check_numbers(seen)?;
-            let marker_in_tanker = marker_in_tanker(seen.id)
-                .ok_or_else(|| unknown_ids(detections, &marker_in_tanker))?;
-            check_in_image(camera, seen)?;
-            Ok(Observation {
-                id: seen.id,
-                marker_in_tanker,
-                pixel: Pixel {
-                    u: seen.u_px,
-                    v: seen.v_px,
-                },
-                sigma_px: if seen.sigma_px == 0.0 {
-                    default_sigma_px
-                } else {
-                    seen.sigma_px
-                },
-            })
+            check_detection(camera, seen, default_sigma_px, &marker_in_tanker)
+                .map_err(|fault| refusal(fault, camera, seen, detections, &marker_in_tanker))
         })
         .collect::<Result<Vec<_>, Refusal>>()?;
     check_unique(detections)?;
     Ok(observations)
 }
 
-fn check_numbers(seen: &Detection) -> Result<(), Refusal> {
+/// What is wrong with a detection, without words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Fault {
+    NotFinite,
+    Sigma,
+    UnknownId,
+    OutsideImage,
+}
+
+/// Returns a detection as an observation; see [`observe`].
+pub(super) fn check_detection(
+    camera: &Camera,
+    seen: &Detection,
+    default_sigma_px: f64,
+    marker_in_tanker: impl Fn(u32) -> Option<Point3<f64>>,
+) -> Result<Observation, Fault> {
     let Detection {
         id,
         u_px,
@@ -89,47 +92,88 @@ fn check_numbers(seen: &Detection) -> Result<(), Refusal> {
         sigma_px,
     } = *seen;
     if !(u_px.is_finite() && v_px.is_finite()) {
-        return Err(Refusal::NotFinite { id, u_px, v_px });
+        return Err(Fault::NotFinite);
     }
     if sigma_px != 0.0 && !(MIN_SIGMA_PX..=MAX_SIGMA_PX).contains(&sigma_px) {
-        return Err(Refusal::InvalidSigma { id, sigma_px });
+        return Err(Fault::Sigma);
     }
-    Ok(())
+    let marker_in_tanker = marker_in_tanker(id).ok_or(Fault::UnknownId)?;
+    if !is_in_image(camera, seen) {
+        return Err(Fault::OutsideImage);
+    }
+    Ok(Observation {
+        id,
+        marker_in_tanker,
+        pixel: Pixel { u: u_px, v: v_px },
+        sigma_px: if sigma_px == 0.0 {
+            default_sigma_px
+        } else {
+            sigma_px
+        },
+    })
 }
 
+/// Returns whether a pixel can be of this image.
+///
 /// A centroid may be slightly outside the image. A pixel that is outside by more than the image's width or height is
 /// garbage, or belongs to a `camera_info` of another resolution.
-fn check_in_image(camera: &Camera, seen: &Detection) -> Result<(), Refusal> {
+fn is_in_image(camera: &Camera, seen: &Detection) -> bool {
     let size = camera.image_size_px();
     let within = |value: f64, length: Option<u32>| {
         let length = length.map_or(MAX_PIXEL, f64::from);
         (-length..=2.0 * length).contains(&value)
     };
-    if within(seen.u_px, size.map(|s| s.0)) && within(seen.v_px, size.map(|s| s.1)) {
-        return Ok(());
+    within(seen.u_px, size.map(|s| s.0)) && within(seen.v_px, size.map(|s| s.1))
+}
+
+fn refusal(
+    fault: Fault,
+    camera: &Camera,
+    seen: &Detection,
+    detections: &[Detection],
+    known: impl Fn(u32) -> Option<Point3<f64>>,
+) -> Refusal {
+    let Detection {
+        id,
+        u_px,
+        v_px,
+        sigma_px,
+    } = *seen;
+    match fault {
+        Fault::NotFinite => Refusal::NotFinite { id, u_px, v_px },
+        Fault::Sigma => Refusal::InvalidSigma { id, sigma_px },
+        Fault::UnknownId => unknown_ids(detections, known),
+        Fault::OutsideImage => {
+            let size = camera.image_size_px();
+            let image = size.map_or("image".to_owned(), |(width, height)| {
+                format!("{width} × {height} image")
+            });
+            Refusal::OutsideImage {
+                id,
+                reason: format!(
+                    "expected a pixel in or near the {image}, got ({u_px:?}, {v_px:?})"
+                ),
+            }
+        }
     }
-    let image = size.map_or("image".to_owned(), |(width, height)| {
-        format!("{width} × {height} image")
-    });
-    Err(Refusal::OutsideImage {
-        id: seen.id,
-        reason: format!(
-            "expected a pixel in or near the {image}, got ({:?}, {:?})",
-            seen.u_px, seen.v_px
-        ),
-    })
+}
+
+/// Returns an id that is there twice: the smallest.
+pub(super) fn first_duplicate(detections: &[Detection]) -> Option<u32> {
+    let mut ids: SmallVec<[u32; MOST_INLINE_DETECTIONS]> =
+        detections.iter().map(|seen| seen.id).collect();
+    ids.sort_unstable();
+    ids.windows(2)
+        .find(|pair| pair[0] == pair[1])
+        .map(|pair| pair[0])
 }
 
 fn check_unique(detections: &[Detection]) -> Result<(), Refusal> {
-    let mut ids: Vec<u32> = detections.iter().map(|seen| seen.id).collect();
-    ids.sort_unstable();
-    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(&[id, _]) => Err(Refusal::DuplicateId {
-            id,
-            count: ids.iter().filter(|&&other| other == id).count(),
-        }),
-        _ => Ok(()),
-    }
+    let Some(id) = first_duplicate(detections) else {
+        return Ok(());
+    };
+    let count = detections.iter().filter(|seen| seen.id == id).count();
+    Err(Refusal::DuplicateId { id, count })
 }
 
 fn unknown_ids(detections: &[Detection], known: impl Fn(u32) -> Option<Point3<f64>>) -> Refusal {

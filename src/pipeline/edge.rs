@@ -83,13 +83,19 @@ impl ImageEdges {
     ) -> (Vec<Observation>, LeftOut) {
         let mut ids = Vec::new();
         observations.retain(|seen| {
-            let is_clear = self.distance_px(seen.pixel) >= margin_px;
+            let is_clear = self.is_clear(seen.pixel, margin_px);
             if !is_clear {
                 ids.push(seen.id);
             }
             is_clear
         });
         (observations, LeftOut { ids, margin_px })
+    }
+
+    /// Returns whether a pixel is clear of the edges by this margin, px.
+    #[must_use]
+    pub fn is_clear(&self, pixel: Pixel, margin_px: f64) -> bool {
+        self.distance_px(pixel) >= margin_px
     }
 
     /// Returns how far a pixel is from the nearest edge, inside or outside; infinity without an edge.

@@ -8,6 +8,7 @@
 //! clock, a file or a topic. What is missing is never replaced by a default, and every frame has an
 //! outcome: a pose, or the one reason for none.
 
+mod bare;
 mod budget;
 mod checks;
 mod code;
@@ -44,8 +45,9 @@ use crate::integrity::{IntegrityMonitor, SolvedFrame, Unavailable};
 use crate::refuelling::RefuellingSetup;
 use crate::target::MarkerMap;
 
+pub use bare::Bare;
 pub use budget::{budget_in_words, error_budget, modes_of_file};
-pub use checks::observe;
+pub use checks::{MOST_INLINE_DETECTIONS, observe};
 pub use code::{IntegrityState, OutcomeCode, TrackCode};
 pub use edge::{ImageEdges, LeftOut};
 pub use frame::{Detection, DetectionFrame};

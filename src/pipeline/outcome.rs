@@ -152,7 +152,12 @@ impl FrameOutcome {
 /// degrees; up to this the true error follows the covariance, beyond it the projection is too nonlinear.
 const MAX_ATTITUDE_SIGMA_DEG: f64 = 10.0;
 
-fn doubt(solution: &Solution, settings: &EstimatorSettings, is_reported: bool) -> Option<Refusal> {
+/// Returns why a solution is not trusted. Uses no heap.
+pub(super) fn doubt(
+    solution: &Solution,
+    settings: &EstimatorSettings,
+    is_reported: bool,
+) -> Option<Refusal> {
     // The prior is to blame where the points agree without it.
     let is_to_blame = |prior: &PriorAgreement| {
         !prior.agrees() && solution.chi_squared - prior.chi_squared <= solution.chi_squared_limit
@@ -175,7 +180,7 @@ fn doubt(solution: &Solution, settings: &EstimatorSettings, is_reported: bool) -
             limit: solution.chi_squared_limit,
             degrees_of_freedom: solution.degrees_of_freedom,
             rms_px: solution.rms_px,
-            unclear: solution.unclear.ids().collect(),
+            unclear: solution.unclear,
         });
     }
     if !solution.covariance.is_valid() {

@@ -2,7 +2,7 @@
 
 use super::{OutcomeCode, Stamp, SuspectMarker};
 use crate::camera::CameraError;
-use crate::estimation::EstimateError;
+use crate::estimation::{EstimateError, Excluded};
 use crate::text::{clip, digits, list, quoted};
 
 /// px; a smaller sigma means that the wrong field was filled in.
@@ -145,7 +145,7 @@ pub enum Refusal {
     #[error(
         "expected chi-squared below {limit:.2} for {degrees_of_freedom} degrees of freedom, got {chi_squared:.2} (rms {} px): {}",
         digits(*rms_px),
-        what_is_wrong(unclear)
+        what_is_wrong(*unclear)
     )]
     NotTrusted {
         /// Of the best fit.
@@ -157,7 +157,7 @@ pub enum Refusal {
         /// Of the best fit, px.
         rms_px: f64,
         /// Marker ids of which either may be the wrong one; empty if no choice explains the frame.
-        unclear: Vec<u32>,
+        unclear: Excluded,
     },
     /// The frame fits only without some of its markers, shortly after frames that no such choice explained.
     #[error(
@@ -266,9 +266,10 @@ const fn hint(error: &EstimateError) -> &'static str {
     }
 }
 
-fn what_is_wrong(unclear: &[u32]) -> String {
-    match unclear {
-        [a, b] => format!(
+fn what_is_wrong(unclear: Excluded) -> String {
+    let mut ids = unclear.ids();
+    match (ids.next(), ids.next()) {
+        (Some(a), Some(b)) => format!(
             "a wrong detection, and it is not clear which: without id {a} or without id {b} the rest agrees"
         ),
         _ => "a wrong detection or id, or a sigma too small?".to_owned(),

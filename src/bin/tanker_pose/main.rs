@@ -1,4 +1,6 @@
 //! `tanker_pose`: tools around the node, one file a subcommand. Those that talk ROS need the feature `ros`.
+//!
+//! These files are also the library `tanker_pose_tools`, for programs that carry the tools inside themselves.
 
 #[cfg(feature = "bags")]
 mod calibrate_map;
@@ -28,15 +30,20 @@ mod tool_node;
 #[cfg(feature = "ros")]
 mod watch;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+/// Exit codes of most tools.
+const SUCCESS: u8 = 0;
+const FAILURE: u8 = 1;
 
 /// Vision-based relative navigation for autonomous aerial refuelling: tools.
 ///
 /// The ROS 2 node itself is the program `tanker_pose_node`.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true)]
+#[command(name = "tanker_pose", version, propagate_version = true)]
 struct Arguments {
     #[command(subcommand)]
     tool: Tool,
@@ -66,8 +73,22 @@ enum Tool {
     Reproduce(reproduce::Arguments),
 }
 
-fn main() -> ExitCode {
-    let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().tool {
+/// Runs the tool of this process's command line.
+pub fn main() -> ExitCode {
+    ExitCode::from(run(std::env::args_os()))
+}
+
+/// Runs the tool of a command line whose first word is the program's name; returns the exit code.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help goes to a reader that may be gone.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(FAILURE);
+        }
+    };
+    let result: Result<(), Box<dyn std::error::Error>> = match arguments.tool {
         #[cfg(feature = "ros")]
         Tool::Demo(arguments) => demo::run(&arguments).map_err(Into::into),
         #[cfg(feature = "ros")]
@@ -88,10 +109,10 @@ fn main() -> ExitCode {
         Tool::Reproduce(arguments) => reproduce::run(&arguments).map_err(Into::into),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => SUCCESS,
         Err(error) => {
             eprintln!("tanker_pose: {error}");
-            ExitCode::FAILURE
+            FAILURE
         }
     }
 }

@@ -24,7 +24,6 @@ mod view;
 use std::cmp::Reverse;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use tanker_pose::camera::{CameraError, CameraFileError, CameraInfo};
 use tanker_pose::pipeline::{integrity_monitor, modes_of_file};
@@ -39,6 +38,8 @@ use self::situation::{Route, Situation};
 use crate::options::{self, CalibrationError, EstimatorOptions, IntegrityOptions, SetupError};
 use crate::plot::panel;
 
+/// The exit code if nothing is to be mended.
+const NOTHING_FOUND: u8 = 0;
 /// Something is to be mended.
 const FOUND: u8 = 1;
 /// Something cannot be read.
@@ -127,17 +128,17 @@ enum CheckError {
 }
 
 /// Checks and prints; the exit code says whether something is to be mended.
-pub fn run(arguments: &Arguments) -> ExitCode {
+pub fn run(arguments: &Arguments) -> u8 {
     let checked = check(arguments).and_then(|(text, severity)| {
         print(&text)?;
         Ok(severity)
     });
     match checked {
-        Ok(None | Some(Severity::Note)) => ExitCode::SUCCESS,
-        Ok(Some(Severity::Warning | Severity::Error)) => ExitCode::from(FOUND),
+        Ok(None | Some(Severity::Note)) => NOTHING_FOUND,
+        Ok(Some(Severity::Warning | Severity::Error)) => FOUND,
         Err(error) => {
             eprintln!("tanker_pose: {error}");
-            ExitCode::from(UNREADABLE)
+            UNREADABLE
         }
     }
 }

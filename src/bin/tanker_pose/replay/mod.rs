@@ -4,7 +4,6 @@ mod timing;
 mod warnings;
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -55,7 +54,7 @@ pub enum Error {
 }
 
 /// Answers the recording; says on standard error what could not be read.
-pub fn run(arguments: &Arguments) -> ExitCode {
+pub fn run(arguments: &Arguments) -> u8 {
     let bar = bar();
     warnings::start(&bar);
     let code = match answer(arguments, &bar) {
@@ -68,7 +67,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         }
     };
     bar.finish_and_clear();
-    ExitCode::from(code)
+    code
 }
 
 fn answer(arguments: &Arguments, bar: &ProgressBar) -> Result<Summary, Error> {
