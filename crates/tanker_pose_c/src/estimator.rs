@@ -58,7 +58,7 @@ impl CreateError {
 
 /// An estimator for one camera and one set of markers, with room for a frame.
 pub struct Estimator {
-    estimator: estimation::Estimator,
+    solver: estimation::Estimator,
     camera: camera::Camera,
     edges: ImageEdges,
     map: MarkerMap,
@@ -89,7 +89,7 @@ impl Estimator {
             })
             .collect();
         Ok(Self {
-            estimator: estimation::Estimator::new(settings(options)?),
+            solver: estimation::Estimator::new(settings(options)?),
             edges: ImageEdges::new(&info, &camera, false),
             camera,
             map: MarkerMap::new("markers", &markers)?,
@@ -115,7 +115,7 @@ impl Estimator {
                 sigma_px: seen.sigma,
             }));
         let bare = Bare {
-            estimator: &self.estimator,
+            estimator: &self.solver,
             camera: &self.camera,
             edges: &self.edges,
             edge_margin_px: self.edge_margin_px,

@@ -39,11 +39,11 @@ impl Frame {
 }
 
 /// Returns an array of a row-major matrix.
-pub fn matrix<'py, const N: usize>(
-    py: Python<'py>,
+pub fn matrix<const N: usize>(
+    py: Python<'_>,
     rows: usize,
     numbers: [f64; N],
-) -> Bound<'py, PyArray2<f64>> {
+) -> Bound<'_, PyArray2<f64>> {
     let columns = N / rows;
     let array = Array2::from_shape_fn((rows, columns), |(row, column)| {
         numbers[row * columns + column]

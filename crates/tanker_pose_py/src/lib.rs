@@ -15,6 +15,12 @@
 //! Every pose comes from `tanker_pose::pipeline`, as in the node. The public names, their shapes and their frames are in
 //! `python/tanker_pose_estimator`.
 
+#![expect(clippy::doc_markdown, reason = "docstrings are read in Python")]
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "what Python passes is extracted by value"
+)]
+
 mod arrays;
 mod budget;
 mod camera;

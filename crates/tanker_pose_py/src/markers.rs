@@ -106,7 +106,7 @@ impl Markers {
     pub fn new(markers: &Bound<'_, PyAny>, ids: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let ids = ids.map(read_ids).transpose()?;
         let found = match markers.cast::<PyMarkerMap>() {
-            Ok(map) => Self::of_map(&map.get().map, ids)?,
+            Ok(map) => Self::of_map(&map.get().map, ids),
             Err(_) => Self::of_array(markers, ids)?,
         };
         let unknown: Vec<u32> = found
@@ -122,17 +122,17 @@ impl Markers {
         Ok(found)
     }
 
-    fn of_map(map: &MarkerMap, ids: Option<Vec<u32>>) -> PyResult<Self> {
+    fn of_map(map: &MarkerMap, ids: Option<Vec<u32>>) -> Self {
         let all: Vec<(u32, Point3<f64>)> = map
             .markers()
             .iter()
             .map(|marker| (marker.id, marker.marker_in_tanker))
             .collect();
-        Ok(Self {
+        Self {
             ids: ids.unwrap_or_else(|| all.iter().map(|(id, _)| *id).collect()),
             sorted: all,
             budget: map.budget().clone(),
-        })
+        }
     }
 
     fn of_array(points: &Bound<'_, PyAny>, ids: Option<Vec<u32>>) -> PyResult<Self> {

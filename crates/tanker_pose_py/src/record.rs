@@ -39,7 +39,7 @@ pub fn size(points: usize) -> usize {
 }
 
 /// Returns numpy's description of a record.
-pub fn dtype<'py>(py: Python<'py>, points: usize) -> PyResult<Bound<'py, PyAny>> {
+pub fn dtype(py: Python<'_>, points: usize) -> PyResult<Bound<'_, PyAny>> {
     let mut names = Vec::new();
     let mut formats = Vec::new();
     let mut offsets = Vec::new();
@@ -94,14 +94,15 @@ pub fn write(
     ids: &[u32],
 ) {
     let mut row = Cursor { row, at: 0 };
-    match solution {
-        Some(solution) if code == OutcomeCode::Ok => {
-            let (rotation, translation) = pose(solution);
-            row.doubles(&rotation);
-            row.doubles(&translation);
-            row.doubles(&solution.covariance.row_major());
-        }
-        _ => row.doubles(&[f64::NAN; 48]),
+    if let Some(solution) = solution
+        && code == OutcomeCode::Ok
+    {
+        let (rotation, translation) = pose(solution);
+        row.doubles(&rotation);
+        row.doubles(&translation);
+        row.doubles(&solution.covariance.row_major());
+    } else {
+        row.doubles(&[f64::NAN; 48]);
     }
     match solution {
         Some(solution) => {

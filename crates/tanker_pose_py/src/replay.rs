@@ -137,13 +137,13 @@ enum ReplayError {
 /// Answers a recording into an MCAP file; returns a dict of topics, each a dict of columns, and what was read.
 #[pyfunction]
 #[pyo3(signature = (recording, output, ros_arguments, answers_only))]
-pub fn replay<'py>(
-    py: Python<'py>,
+pub fn replay(
+    py: Python<'_>,
     recording: PathBuf,
     output: PathBuf,
     ros_arguments: Vec<String>,
     answers_only: bool,
-) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
+) -> PyResult<(Bound<'_, PyDict>, Bound<'_, PyDict>)> {
     let work = || answer(&recording, &output, &ros_arguments, answers_only);
     let (warnings, summary, tables) = py.detach(work).map_err(value_error)?;
     let topics = PyDict::new(py);

@@ -73,7 +73,8 @@ enum Tool {
     Reproduce(reproduce::Arguments),
 }
 
-/// Runs the tool of this process's command line.
+/// Runs the tool of this process's command line. Public, for the library has no use for it.
+#[must_use]
 pub fn main() -> ExitCode {
     ExitCode::from(run(std::env::args_os()))
 }

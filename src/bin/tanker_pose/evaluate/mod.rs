@@ -3,7 +3,6 @@
 mod files;
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -58,12 +57,12 @@ pub enum Error {
 }
 
 /// Evaluates the recordings; says on standard error what could not be read.
-pub fn run(arguments: &Arguments) -> ExitCode {
+pub fn run(arguments: &Arguments) -> u8 {
     match evaluate(arguments) {
-        Ok(code) => ExitCode::from(code),
+        Ok(code) => code,
         Err(error) => {
             eprintln!("tanker_pose: {error}");
-            ExitCode::from(NOTHING)
+            NOTHING
         }
     }
 }
