@@ -104,21 +104,18 @@ pub fn write(
     } else {
         row.doubles(&[f64::NAN; 48]);
     }
-    match solution {
-        Some(solution) => {
-            row.doubles(&[
-                solution.rms_px,
-                solution.chi_squared,
-                solution.chi_squared_limit,
-                solution.ambiguity,
-            ]);
-            row.bytes(&solution.degrees_of_freedom.to_ne_bytes());
-            row.bytes(&solution.iterations.to_ne_bytes());
-        }
-        None => {
-            row.doubles(&[f64::NAN; 4]);
-            row.bytes(&[0; 4]);
-        }
+    if let Some(solution) = solution {
+        row.doubles(&[
+            solution.rms_px,
+            solution.chi_squared,
+            solution.chi_squared_limit,
+            solution.ambiguity,
+        ]);
+        row.bytes(&solution.degrees_of_freedom.to_ne_bytes());
+        row.bytes(&solution.iterations.to_ne_bytes());
+    } else {
+        row.doubles(&[f64::NAN; 4]);
+        row.bytes(&[0; 4]);
     }
     row.bytes(&[code.number(), solution.map_or(0, certificate)]);
     let mut observed = observed.iter().map(|seen| seen.id).peekable();
