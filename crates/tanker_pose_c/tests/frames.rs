@@ -1,5 +1,7 @@
 //! Frames through the functions of the header: the bits of `pipeline::solve`, and no allocation.
 
+#![expect(clippy::indexing_slicing, reason = "a test may panic")]
+
 use std::ptr::null_mut;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
