@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -15,13 +16,14 @@ from rosbags.rosbag2 import StoragePlugin
 
 from harness import paper
 from harness.bags import read_bag, write_approach_bag
-from harness.processes import REPOSITORY, child_environment
+from harness.processes import REPOSITORY, binary, child_environment
 from harness.python_package import IDS, POINTS, camera, directory, frames, tpe
 from harness.solver import request, solve
 
 FRAMES = 300
 MAP = tpe.MarkerMap.shipped("paper")
 NUMBERS = ("rms_px", "chi_squared", "chi_squared_limit", "ambiguity", "degrees_of_freedom", "iterations")
+FLIGHT = REPOSITORY / "examples" / "notebooks" / "approach.mcap"
 PACKAGE = directory() / "tanker_pose_estimator"
 
 
@@ -146,7 +148,8 @@ def test_what_cannot_be_used_raises_with_words(rng: np.random.Generator) -> None
         (lambda: estimator(initialisation="previous").estimate_many(pixels), "use Pipeline"),
         (lambda: estimator(budget=tpe.Budget.from_dict({"sigmas": {"fx": 1.0}}), k1_sigma=0.1), "set only one"),
         (lambda: tpe.Budget.from_dict({"sigmas": {"k9": 1.0}}), "k9"),
-        (lambda: tpe.Camera(0.0, 571.0, 254.0, 206.0), "fx"),
+        (lambda: tpe.Camera(0.0, 571.0, 254.0, 206.0), "not calibrated"),
+        (lambda: tpe.Camera(np.nan, 571.0, 254.0, 206.0), "NaN"),
         (lambda: tpe.Camera.from_dict({"k": [1.0] * 8}), "expected 9 numbers in k, got 8"),
         (lambda: tpe.Camera.from_dict({"width": 5}), 'missing field "k"'),
         (lambda: camera(fx=571.0), 'unknown field "fx"'),
@@ -270,38 +273,82 @@ def test_a_recording_that_cannot_be_read_raises_with_words(tmp_path: Path) -> No
         tpe.replay(tmp_path / "no.mcap", parameters={"edge": 1.0})
 
 
-def test_the_command_of_the_wheel_is_the_program(rng: np.random.Generator) -> None:
+def test_the_command_of_the_wheel_is_the_program(tmp_path: Path, rng: np.random.Generator) -> None:
     environment = child_environment() | {"PYTHONPATH": str(directory())}
-    command = [sys.executable, str(directory() / "bin" / "tanker_pose")]
+    programs = {"wheel": [sys.executable, str(directory() / "bin" / "tanker_pose")], "cargo": [binary("tanker_pose")]}
 
-    def run(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*command, *arguments], input=text, env=environment, capture_output=True, text=True, timeout=60
-        )
+    def both(*arguments: str, text: str = "") -> subprocess.CompletedProcess[str]:
+        """Runs both in a folder of their own; returns what they agree on."""
+        done = {}
+        for name, program in programs.items():
+            (tmp_path / name).mkdir(exist_ok=True)
+            done[name] = subprocess.run(
+                [*program, *arguments],
+                input=text,
+                env=environment,
+                cwd=tmp_path / name,
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+        wheel, cargo = done.values()
+        assert (wheel.returncode, wheel.stdout, wheel.stderr) == (cargo.returncode, cargo.stdout, cargo.stderr)
+        return wheel
 
-    line = json.dumps(request(5, frames(1, rng)[0][0]))
-    solved = run("solve", text=line)
-    assert solved.returncode == 0
-    assert json.loads(solved.stdout) == solve(line)[0]
-    assert run("check").returncode == run("check").returncode != 2
-    help_ = run("--help")
-    assert help_.returncode == 0 and {"solve", "replay", "check"} <= set(help_.stdout.split())
-    assert "simulate" not in help_.stdout
-    wrong = run("replay", "/nowhere.mcap")
-    assert wrong.returncode == 2 and "nowhere.mcap" in wrong.stderr
-    assert run("solved").returncode == 2
+    assert both("solve", text=json.dumps(request(5, frames(1, rng)[0][0]))).stdout.startswith('{"id":5')
+    assert both("check", "--marker-map", "paper").returncode == 1
+    assert both("replay", str(FLIGHT), "-o", "answers.mcap").returncode == 0
+    assert both("evaluate", "answers.mcap", "-o", "report").returncode == 0
+    for file in ("answers.mcap", "report/evaluation.json"):
+        wheel, cargo = ((tmp_path / name / file).read_bytes() for name in programs)
+        assert wheel == cargo, file
+    assert "nowhere.mcap" in both("replay", "/nowhere.mcap").stderr
+    assert both("solved").returncode == both("solve", "--no-such-option").returncode == 2
+
+    help_ = subprocess.run(
+        [*programs["wheel"], "--help"], env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    words = set(help_.stdout.split())
+    assert {"solve", "replay", "evaluate", "check", "reproduce"} <= words and not words & {"simulate", "demo", "watch"}
 
 
-def test_the_first_program_of_the_page_prints_a_pose() -> None:
+def test_the_programs_of_the_page_run(
+    tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     page = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
-    program = page.split("```python\n")[1].split("```")[0]
-    environment = child_environment() | {"PYTHONPATH": str(directory())}
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    numbers = [float(word) for word in done.stdout.replace("[", " ").replace("]", " ").split()]
+    programs = [part.split("```")[0] for part in page.split("```python\n")[1:]]
+    pixels, sigma_px = frames(50, rng)
+    shutil.copy(REPOSITORY / "config" / "tankers" / "paper.yaml", tmp_path / "tanker.yaml")
+    shutil.copy(FLIGHT, tmp_path / "flight.mcap")
+    monkeypatch.chdir(tmp_path)
+    seen = [0, 1, 3, 4, 5]
+    flight = {"stamp_ns": 10**9, "pixels": pixels[1][seen], "sigma_px": sigma_px[1][seen]}
+    given: list[dict[str, Any]] = [
+        {},
+        {"pixels": pixels, "sigma_px": sigma_px, "visible": rng.uniform(size=sigma_px.shape) < 0.95},
+        flight,
+        {},
+    ]
+
+    names: dict[str, Any] = {}
+    printed = []
+    for program, inputs in zip(programs, given, strict=True):
+        names |= inputs
+        exec(compile(program, "docs/python.md", "exec"), names)
+        printed.append(capsys.readouterr().out)
+
+    numbers = [float(word) for word in printed[0].replace("[", " ").replace("]", " ").split()]
     assert np.allclose(numbers[:3], paper.POSE.translation, atol=0.3)
     assert len(numbers) == 9 and all(number > 0.0 for number in numbers[3:])
+    assert len(names["records"]) == 50 and 0 < len(names["good"]) < 50
+    assert names["frame"].is_trusted
+    assert names["status"]["outcome"].shape == (names["replayed"].frames,) == (200,)
+    poses = names["poses"]
+    assert {"stamp_ns", "translation_2", "quaternion_xyzw_3", "covariance_5_5"} <= set(poses.columns)
+    covariances = names["replayed"].topics["/pose"]["covariance"]
+    assert poses["covariance_0_2"].tolist() == covariances[:, 0, 2].tolist()
+    assert names["replayed"].dataframe("/status")["used_ids"][1] == IDS
 
 
 def test_enums_are_those_of_the_status_message() -> None:
@@ -355,11 +402,14 @@ def test_the_stub_names_what_there_is_with_its_arguments() -> None:
     assert (PACKAGE / "py.typed").is_file()
 
 
-def test_the_wheel_serves_every_python_since_3_10_and_lists_what_is_in_it() -> None:
+def test_the_wheel_serves_every_python_since_3_10_and_names_every_crate_in_it() -> None:
     (info,) = directory().glob("tanker_pose_estimator-*.dist-info")
     tags = [line for line in (info / "WHEEL").read_text().splitlines() if line.startswith("Tag:")]
     assert all("cp310-abi3" in tag for tag in tags) and tags
     (bill,) = (info / "sboms").glob("*.json")
-    components = {part["name"] for part in json.loads(bill.read_text(encoding="utf-8"))["components"]}
-    assert {"nalgebra", "pyo3", "rusqlite", "mcap"} <= components
-    assert "ros2-client" not in components
+    components = {(part["name"], part["version"]) for part in json.loads(bill.read_text(encoding="utf-8"))["components"]}
+    tree = ["cargo", "tree", "--locked", "--offline", "-p", "tanker_pose_py", "-e", "normal", "--prefix", "none"]
+    done = subprocess.run(tree, cwd=REPOSITORY, capture_output=True, text=True, timeout=60, check=True)
+    crates = {tuple(line.split()[:2]) for line in done.stdout.splitlines()}
+    crates = {(name, version.removeprefix("v")) for name, version in crates if name != "tanker_pose_py"}
+    assert len(crates) > 100 and crates <= components

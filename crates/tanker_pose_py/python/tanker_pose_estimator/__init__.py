@@ -17,7 +17,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,9 @@ from ._native import (
     RefusalError,
 )
 from ._native import replay as _replay
+
+if TYPE_CHECKING:
+    import pandas
 
 __all__ = [
     "Budget",
@@ -126,8 +129,7 @@ def estimate_many(
 class Replayed:
     """The answers to a recording.
 
-    ``topics`` has the columns of each topic by its absolute name, for ``pandas.DataFrame`` where a column has one number a
-    row. ``/status`` has one row a frame: stamp_ns, outcome, message, track, chi_squared, ...; ``/pose`` one a trusted pose:
+    ``topics`` has the columns of each topic by its absolute name. ``/status`` has one row a frame: stamp_ns, outcome, message, track, chi_squared, ...; ``/pose`` one a trusted pose:
     stamp_ns, translation (rows, 3), quaternion_xyzw (rows, 4), covariance (rows, 6, 6); ``/odometry`` the track, besides
     with linear, angular (rows, 3; the tanker's axes) and twist_covariance.
     """
@@ -140,6 +142,22 @@ class Replayed:
     """What could not be read or used, in words."""
     notes: list[str]
     """What was used and may surprise."""
+
+    def dataframe(self, topic: str) -> pandas.DataFrame:
+        """Returns the columns of a topic for pandas: each element of a vector or matrix has a column of its own.
+
+        ``translation`` becomes ``translation_0`` to ``translation_2``, ``covariance`` ``covariance_0_0`` to
+        ``covariance_5_5``. Needs pandas.
+        """
+        import pandas
+
+        columns: dict[str, Any] = {}
+        for name, column in self.topics[topic].items():
+            places = np.ndindex(column.shape[1:]) if isinstance(column, np.ndarray) else [()]
+            for place in places:
+                elements = column[(slice(None), *place)] if place else column
+                columns["_".join(map(str, (name, *place)))] = elements
+        return pandas.DataFrame(columns)
 
 
 def replay(

@@ -1,4 +1,4 @@
-"""The command ``tanker_pose``, without ROS: solve, replay, check, reproduce."""
+"""The command ``tanker_pose``, without ROS: solve, replay, evaluate, check, reproduce."""
 
 import signal
 import sys
