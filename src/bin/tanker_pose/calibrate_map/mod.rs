@@ -4,7 +4,6 @@ mod files;
 mod report;
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use ros2_node::arguments::ArgumentError;
 use tanker_pose::calibration::{CalibrateError, CalibrationSettings, MountPrior, calibrate};
@@ -14,6 +13,13 @@ use tanker_pose::target::{BodyChange, MapChange, MarkerMap, MarkerMapError};
 
 use crate::options::{self, CalibrationError};
 use crate::ros_options::RosOptions;
+
+/// Something was refined.
+const REFINED: u8 = 0;
+/// The data support nothing of what may be wrong.
+const NOT_TOLD: u8 = 1;
+/// An error.
+const FAILED: u8 = 2;
 
 /// Refine marker map, camera mount and camera from a recorded approach, with honest sigmas; measure the detector's noise.
 ///
@@ -93,13 +99,13 @@ enum Error {
 }
 
 /// Runs the tool; says on standard error what could not be read.
-pub fn run(arguments: &Arguments) -> ExitCode {
+pub fn run(arguments: &Arguments) -> u8 {
     match refine(arguments) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(true) => REFINED,
+        Ok(false) => NOT_TOLD,
         Err(error) => {
             eprintln!("tanker_pose: {error}");
-            ExitCode::from(2)
+            FAILED
         }
     }
 }
