@@ -11,7 +11,6 @@ use tanker_pose::estimation::{Estimator, EstimatorSettings, Solution};
 use tanker_pose::pipeline::{Bare, Detection, ImageEdges, OutcomeCode};
 use tanker_pose::target::MarkerMap;
 
-const RUNS: usize = 3;
 const POINTS: usize = 6;
 /// Frames that one thread takes at a time.
 const CHUNK: usize = 256;
@@ -59,40 +58,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         edge_margin_px: 0.0,
         pixel_sigma_px: 0.5,
     };
-    let mut best_s = f64::INFINITY;
-    let mut frames = 0;
-    for _ in 0..RUNS {
-        let begin = Instant::now();
-        let rows: Vec<Row> = numbers
-            .par_chunks(2 * POINTS * CHUNK)
-            .flat_map_iter(|chunk| {
-                let (mut detections, mut room) = (Vec::new(), Vec::new());
-                let bare = &bare;
-                let map = &map;
-                chunk.chunks_exact(2 * POINTS).map(move |pixels| {
-                    detections.clear();
-                    detections.extend((1..).zip(pixels.chunks_exact(2)).map(|(id, pixel)| {
-                        Detection {
+    let begin = Instant::now();
+    let rows: Vec<Row> = numbers
+        .par_chunks(2 * POINTS * CHUNK)
+        .flat_map_iter(|chunk| {
+            let (mut detections, mut room) = (Vec::new(), Vec::new());
+            let (bare, map) = (&bare, &map);
+            chunk.chunks_exact(2 * POINTS).map(move |pixels| {
+                detections.clear();
+                detections.extend(
+                    (1..)
+                        .zip(pixels.chunks_exact(2))
+                        .map(|(id, pixel)| Detection {
                             id,
                             u_px: pixel[0],
                             v_px: pixel[1],
                             sigma_px: 0.0,
-                        }
-                    }));
-                    let (code, solution) =
-                        bare.solve(&detections, |id| map.get(id), None, &mut room);
-                    Row::new(code, solution.as_ref())
-                })
+                        }),
+                );
+                let (code, solution) = bare.solve(&detections, |id| map.get(id), None, &mut room);
+                Row::new(code, solution.as_ref())
             })
-            .collect();
-        best_s = best_s.min(begin.elapsed().as_secs_f64());
-        frames = rows.len();
-        let is_trusted = |row: &&Row| row.code == OutcomeCode::Ok && row.numbers[0].is_finite();
-        eprintln!(
-            "{} of {frames} frames trusted",
-            rows.iter().filter(is_trusted).count()
-        );
-    }
-    println!("{:e}", best_s / frames as f64);
+        })
+        .collect();
+    let took_s = begin.elapsed().as_secs_f64();
+    let is_trusted = |row: &&Row| row.code == OutcomeCode::Ok && row.numbers[0].is_finite();
+    let trusted = rows.iter().filter(is_trusted).count();
+    eprintln!("{trusted} of {} frames trusted", rows.len());
+    println!("{:e}", took_s / rows.len() as f64);
     Ok(())
 }

@@ -57,8 +57,7 @@ int main(void) {
     }
     if (result != 0) break;
     printf("%s", tanker_pose_outcome_name(pose.outcome));
-    // Only then is there a pose.
-    if (pose.outcome == 0) {
+    if (pose.outcome == TANKER_POSE_OUTCOME_OK) {
       print(pose.rotation, 9);
       print(pose.translation, 3);
       print(pose.covariance, 36);

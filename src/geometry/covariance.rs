@@ -45,6 +45,12 @@ impl PoseCovariance {
         attitude.symmetric_eigenvalues().max().max(0.0).sqrt()
     }
 
+    /// Returns what [`Self::largest_attitude_sigma`] cannot exceed, rad: the root of the sum of the eigenvalues.
+    #[must_use]
+    pub(crate) fn attitude_sigma_bound(&self) -> f64 {
+        (self.0[(3, 3)] + self.0[(4, 4)] + self.0[(5, 5)]).sqrt()
+    }
+
     /// Returns whether the matrix is finite, symmetric and positive definite.
     #[must_use]
     pub fn is_valid(&self) -> bool {

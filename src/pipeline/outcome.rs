@@ -200,6 +200,10 @@ pub(super) fn doubt(
     if settings.require_certificate && !is_proven {
         return Some(Refusal::NotCertified);
     }
+    // Almost every frame is far below the limit, and the bound takes no decomposition.
+    if solution.covariance.attitude_sigma_bound().to_degrees() <= MAX_ATTITUDE_SIGMA_DEG {
+        return None;
+    }
     let sigma_deg = solution.covariance.largest_attitude_sigma().to_degrees();
     (sigma_deg > MAX_ATTITUDE_SIGMA_DEG).then_some(Refusal::TooUncertain {
         sigma_deg,

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+import multiprocessing
 import shutil
 import subprocess
 import sys
@@ -29,6 +30,10 @@ PACKAGE = directory() / "tanker_pose_estimator"
 
 def estimator(**parameters: Any) -> tpe.Estimator:
     return tpe.Estimator(camera(), POINTS, ids=IDS, **parameters)
+
+
+def estimated(estimate_many: Any, *arrays: Any) -> bytes:
+    return estimate_many(*arrays).tobytes()
 
 
 def bits(values: Any) -> bytes:
@@ -115,6 +120,9 @@ def test_order_layout_and_type_of_arrays_do_not_matter(rng: np.random.Generator)
     assert estimator().estimate_many(np.asfortranarray(pixels), sigmas).tobytes() == expected
     assert estimator().estimate_many(pixels.tolist(), sigmas.tolist()).tobytes() == expected
     assert estimator().estimate_many(pixels[::-1], sigmas[::-1])[::-1].tobytes() == expected
+    apart = np.zeros(pixels.nbytes + 1, np.uint8)[1:].view(np.float64).reshape(pixels.shape)
+    apart[:] = pixels
+    assert not apart.flags.aligned and estimator().estimate_many(apart, sigmas).tobytes() == expected
     of_map = tpe.Estimator(camera(), MAP).estimate_many(pixels, sigmas)
     assert of_map.tobytes() == expected
 
@@ -136,6 +144,8 @@ def test_what_cannot_be_used_raises_with_words(rng: np.random.Generator) -> None
         (lambda: one.estimate_many(pixels, visible=np.ones((6, 3), bool)), r"visible: .*\(3, 6\)"),
         (lambda: one.estimate(pixels[0], ids=[1, 2, 3, 4, 5, -6]), "ids: expected a sequence of whole numbers"),
         (lambda: one.estimate(pixels[0].astype(str)[:, :1]), "shape"),
+        (lambda: one.estimate_many(np.ma.masked_invalid(pixels)), "without a mask"),
+        (lambda: tpe.estimate(camera(), POINTS, pixels[0], ids=[1.5, 2, 3, 4, 5, 6]), "ids: expected"),
         (lambda: tpe.Estimator(camera(), POINTS, ids=[1, 1, 2, 3, 4, 5]), "id 1 .*2"),
         (lambda: tpe.Estimator(camera(), MAP, ids=[1, 2, 77]), "77"),
         (lambda: tpe.Estimator(camera(), POINTS * np.nan), "expected coordinates within .* NaN"),
@@ -212,6 +222,33 @@ def test_other_threads_run_while_many_frames_are_estimated(rng: np.random.Genera
     finally:
         sys.setswitchinterval(interval_s)
     assert order == ["begun", "meanwhile", "done"]
+
+
+def test_a_forked_process_estimates_many_frames_too(rng: np.random.Generator) -> None:
+    pixels, sigmas = frames(1000, rng)
+    one = estimator()
+    expected = one.estimate_many(pixels, sigmas).tobytes()
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        found = pool.apply_async(estimated, (one.estimate_many, pixels, sigmas)).get(timeout=30)
+    assert found == expected
+
+
+def test_estimate_keeps_estimators_by_what_they_are_made_of(rng: np.random.Generator) -> None:
+    pixels, _ = frames(2, rng)
+    seen, points = camera(), POINTS.copy()
+    first = tpe.estimate(seen, points, pixels[1], ids=IDS)
+    assert bits(tpe.estimate(seen, points, pixels[1], ids=IDS).translation) == bits(first.translation)
+    points += [1.0, 0.0, 0.0]
+    moved = tpe.estimate(seen, points, pixels[1], ids=IDS)
+    assert np.allclose(moved.translation, first.translation - first.rotation[:, 0], atol=1e-6)
+    with pytest.raises(ValueError, match="certify"):
+        tpe.estimate(seen, points, pixels[1], certify=1)
+    assert tpe.estimate(seen, points, pixels[1], certify=True).certificate == "certified"
+    with pytest.raises(ValueError, match="certify"):
+        tpe.estimate(seen, points, pixels[1], certify=1)
+    for sigma_px in np.linspace(0.3, 0.6, 40):
+        assert tpe.estimate(seen, MAP, pixels[1], pixel_sigma_px=sigma_px).is_trusted
+    assert len(tpe._kept) <= tpe._MOST_KEPT
 
 
 def test_a_pipeline_answers_a_bag_as_replay_does(tmp_path: Path, rng: np.random.Generator) -> None:

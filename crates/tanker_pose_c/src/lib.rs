@@ -18,7 +18,7 @@ pub use estimator::{CreateError, Estimator, MOST_DETECTIONS};
 pub use types::{
     Camera, Detection, INITIALISATION_DLT, INITIALISATION_GLOBAL, INITIALISATION_NOMINAL,
     INITIALISATION_PREVIOUS, LENS_EQUIDISTANT, LENS_NONE, LENS_PLUMB_BOB, LENS_RATIONAL_POLYNOMIAL,
-    MOST_COEFFICIENTS, Marker, Options, Pose, Status,
+    MOST_COEFFICIENTS, Marker, OUTCOME_OK, Options, Pose, Status,
 };
 
 /// Runs what may not panic, and says so if it does.
@@ -39,6 +39,18 @@ unsafe fn elements<'a, T>(data: *const T, count: usize) -> Option<&'a [T]> {
     }
     // SAFETY: not null, aligned, not too long; initialised and unchanged by the caller's promise.
     Some(unsafe { std::slice::from_raw_parts(data, count) })
+}
+
+/// Returns what a pointer of C points to; `None` if it is null or not aligned.
+///
+/// # Safety
+/// `data` is null, or points to an initialised value that nothing changes while the result is in use.
+unsafe fn element<'a, T>(data: *const T) -> Option<&'a T> {
+    if !data.is_aligned() {
+        return None;
+    }
+    // SAFETY: null or aligned; initialised and unchanged by the caller's promise.
+    unsafe { data.as_ref() }
 }
 
 /// Returns the default options: those of the node.
@@ -97,7 +109,7 @@ unsafe fn say(words: &str, message: *mut c_char, size: usize) {
 ///
 /// # Safety
 /// `camera` and `options` are null or point to such structs, `markers` to `marker_count` of them, `made` is null or points
-/// to a place for a pointer, `message` is null or points to `message_size` bytes.
+/// to a place for a pointer, `message` is null or points to `message_size` bytes. None of them overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tanker_pose_create(
     camera: *const Camera,
@@ -111,15 +123,15 @@ pub unsafe extern "C" fn tanker_pose_create(
     // SAFETY: null or that many bytes, by the caller's promise.
     unsafe { say("", message, message_size) };
     guarded(|| {
-        // SAFETY: null or a valid place, by the caller's promise; nothing else refers to it meanwhile.
-        let Some(made) = (unsafe { made.as_mut() }) else {
+        if made.is_null() || !made.is_aligned() {
             return Status::NullPointer;
-        };
-        *made = std::ptr::null_mut();
+        }
+        // SAFETY: a valid place, by the caller's promise; what is in it is not read.
+        unsafe { made.write(std::ptr::null_mut()) };
         // SAFETY: null or a valid struct, by the caller's promise.
-        let camera = unsafe { camera.as_ref() };
+        let camera = unsafe { element(camera) };
         // SAFETY: null or a valid struct, by the caller's promise.
-        let options = unsafe { options.as_ref() };
+        let options = unsafe { element(options) };
         // SAFETY: null or that many valid structs, by the caller's promise.
         let markers = unsafe { elements(markers, marker_count) };
         let (Some(camera), Some(options), Some(markers)) = (camera, options, markers) else {
@@ -127,7 +139,8 @@ pub unsafe extern "C" fn tanker_pose_create(
         };
         match Estimator::new(camera, markers, options) {
             Ok(estimator) => {
-                *made = Box::into_raw(Box::new(estimator));
+                // SAFETY: as above.
+                unsafe { made.write(Box::into_raw(Box::new(estimator))) };
                 Status::Ok
             }
             Err(error) => {

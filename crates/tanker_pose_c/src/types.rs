@@ -145,6 +145,9 @@ impl Default for Options {
     }
 }
 
+/// The outcome of a frame with a trusted pose.
+pub const OUTCOME_OK: u32 = 0;
+
 /// The outcome of a frame, and its pose if it has one.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,7 +166,7 @@ pub struct Pose {
     pub chi_squared_limit: f64,
     /// Likelihood of the second-best pose relative to this one.
     pub ambiguity: f64,
-    /// A constant of `tanker_pose/msg/EstimatorStatus`: 0 is a trusted pose; its name: `tanker_pose_outcome_name`.
+    /// A constant of `tanker_pose/msg/EstimatorStatus`: `TANKER_POSE_OUTCOME_OK`, or why there is no pose; its name: `tanker_pose_outcome_name`.
     pub outcome: u32,
     /// Of `chi_squared`.
     pub degrees_of_freedom: u32,

@@ -1,6 +1,8 @@
 //! Arrays of Python as slices of numbers.
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
 
@@ -9,7 +11,7 @@ use crate::errors::value_error;
 /// Returns an array of doubles without gaps: the caller's own where it is one, or else a copy.
 ///
 /// # Errors
-/// As numpy, where the value has no array of doubles.
+/// As numpy, where the value has no array of doubles, and a `ValueError` for masked arrays.
 pub fn doubles<'py>(value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     converted(value, "float64")
 }
@@ -53,15 +55,24 @@ fn converted<'py, T: numpy::Element>(
     value: &Bound<'py, PyAny>,
     dtype: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    let py = value.py();
+    // Of a subclass: numpy's masked arrays hold any number where the mask is set.
+    if value.is_instance_of::<PyUntypedArray>()
+        && !value.is_exact_instance_of::<PyUntypedArray>()
+        && value.hasattr("mask")?
+    {
+        return Err(value_error(
+            "expected an array without a mask; what is missing is told by visible, or left out",
+        ));
+    }
     if let Ok(array) = value.cast::<PyArrayDyn<T>>()
         && array.is_c_contiguous()
+        && array.is_aligned()
     {
         return Ok(array.try_readonly()?);
     }
-    let py = value.py();
-    let options = [("dtype", dtype)].into_py_dict(py)?;
-    let array =
-        numpy::get_array_module(py)?.call_method("ascontiguousarray", (value,), Some(&options))?;
+    let wanted = ["C_CONTIGUOUS", "ALIGNED"];
+    let array = numpy::get_array_module(py)?.call_method1("require", (value, dtype, wanted))?;
     Ok(array.cast_into::<PyArrayDyn<T>>()?.try_readonly()?)
 }
 

@@ -1,11 +1,11 @@
 //! One frame, or many on all cores.
 
 use nalgebra::{Matrix3, Rotation3};
-use numpy::PyUntypedArrayMethods;
-use numpy::{PyArray2, PyArrayMethods};
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rayon::prelude::*;
 use tanker_pose::estimation::{Estimator, Initialisation};
 use tanker_pose::geometry::nearest_rotation;
 use tanker_pose::pipeline::{
@@ -48,6 +48,29 @@ impl PyEstimator {
         };
         let (observations, left_out) = sight.edges.leave_out(observations, self.edge_margin_px);
         pipeline::solve(&self.estimator, &sight.camera, &observations, previous).without(left_out)
+    }
+
+    /// Writes the records of all frames on all cores.
+    ///
+    /// The threads are this call's own: those of a pool would be missing in a process that Python has forked.
+    fn fill_all(&self, rows: &mut [u8], size: usize, frames: &Frames) {
+        let count = rows.len() / size;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = cores.min(count.div_ceil(CHUNK));
+        if threads < 2 {
+            return self.fill(rows, size, 0, frames);
+        }
+        let chunks = Mutex::new(rows.chunks_mut(size * CHUNK).enumerate());
+        let next = || chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    while let Some((chunk, rows)) = next() {
+                        self.fill(rows, size, chunk * CHUNK, frames);
+                    }
+                });
+            }
+        });
     }
 
     /// Writes the records of frames from `first` on: the same verdicts as of [`Self::outcome`], without words.
@@ -174,19 +197,13 @@ impl PyEstimator {
             sigmas: sigmas.slices()?,
             visible: mask.as_ref().map(|mask| mask.as_slice()).transpose()?,
         };
-        let size = record::size(ids.len());
-        let bytes = PyArray2::<u8>::zeros(py, [count, size], false);
-        {
-            let mut rows = bytes.readwrite();
-            let rows = rows.as_slice_mut()?;
-            py.detach(|| {
-                rows.par_chunks_mut(size * CHUNK)
-                    .enumerate()
-                    .for_each(|(chunk, rows)| self.fill(rows, size, chunk * CHUNK, &frames));
-            });
-        }
-        let records = bytes.call_method1("view", (record::dtype(py, ids.len())?,))?;
-        records.call_method1("reshape", (count,))
+        let dtype = record::dtype(py, ids.len())?;
+        let records = numpy::get_array_module(py)?.call_method1("zeros", (count, dtype))?;
+        let bytes = records.call_method1("view", ("uint8",))?;
+        let mut bytes = bytes.cast::<PyArray1<u8>>()?.readwrite();
+        let rows = bytes.as_slice_mut()?;
+        py.detach(|| self.fill_all(rows, record::size(ids.len()), &frames));
+        Ok(records)
     }
 }
 

@@ -7,22 +7,25 @@ use tanker_pose::config::{self, Configuration, KEYS, ParameterValue, Parameters,
 use crate::errors::value_error;
 
 /// Parameters that only a sequence of frames has a use for.
-const OF_SEQUENCES: [&str; 14] = [
-    "attitude",
-    "widen_by_sigma_factor",
-    "reported_attitude_sigma_deg",
-    "correlated_noise_share",
-    "correlated_noise_time_s",
-    "track",
-    "acceleration_density_mps2",
-    "angular_acceleration_density_dps2",
-    "manoeuvre_factor",
-    "initial_speed_sigma_mps",
-    "initial_rate_sigma_dps",
-    "gate_probability",
-    "max_gap_s",
-    "confirm_frames",
-];
+fn is_of_sequences(name: &str) -> bool {
+    [
+        KEYS.attitude.name(),
+        KEYS.widen_by_sigma_factor.name(),
+        KEYS.reported_attitude_sigma_deg.name(),
+        KEYS.correlated_noise_share.name(),
+        KEYS.correlated_noise_time_s.name(),
+        KEYS.track.name(),
+        KEYS.acceleration_density_mps2.name(),
+        KEYS.angular_acceleration_density_dps2.name(),
+        KEYS.manoeuvre_factor.name(),
+        KEYS.initial_speed_sigma_mps.name(),
+        KEYS.initial_rate_sigma_dps.name(),
+        KEYS.gate_probability.name(),
+        KEYS.max_gap_s.name(),
+        KEYS.confirm_frames.name(),
+    ]
+    .contains(&name)
+}
 
 /// Parameters of an estimate.
 fn is_of_estimates(name: &str) -> bool {
@@ -77,10 +80,9 @@ pub fn configuration(
     let mut parameters = Parameters::new(TABLE);
     for (name, value) in given.into_iter().flatten() {
         let name: String = name.extract()?;
-        let is_known =
-            is_of_estimates(&name) || (of != Use::Frames && OF_SEQUENCES.contains(&name.as_str()));
+        let is_known = is_of_estimates(&name) || (of != Use::Frames && is_of_sequences(&name));
         if parameters.spec(&name).is_some() && !is_known {
-            let hint = if OF_SEQUENCES.contains(&name.as_str()) {
+            let hint = if is_of_sequences(&name) {
                 "; Pipeline takes it"
             } else {
                 ""

@@ -88,6 +88,39 @@ class Track(enum.IntEnum):
     INSERTED = 6
 
 
+_MOST_KEPT = 16
+_kept: dict[Any, Estimator] = {}
+
+
+def _numbers(values: npt.ArrayLike | None) -> Any:
+    """Returns what tells these numbers from others."""
+    if values is None:
+        return None
+    array = np.asarray(values)
+    return array.dtype.str, array.shape, array.tobytes()
+
+
+def _estimator(
+    camera: Camera,
+    markers: MarkerMap | npt.ArrayLike,
+    ids: Sequence[int] | None,
+    budget: Budget | None,
+    parameters: dict[str, bool | float | str],
+) -> Estimator:
+    """Returns an estimator; the last ones are kept, because making one takes as long as hundreds of frames."""
+    of_markers = markers if isinstance(markers, MarkerMap) else _numbers(markers)
+    # The type belongs to a value: True, 1 and 1.0 are equal, and only one of them is right.
+    of_parameters = tuple((name, type(value), value) for name, value in parameters.items())
+    key = (camera, of_markers, _numbers(ids), budget, of_parameters)
+    found = _kept.get(key)
+    if found is None:
+        found = Estimator(camera, markers, ids=ids, budget=budget, **parameters)
+        while len(_kept) >= _MOST_KEPT:
+            _kept.pop(next(iter(_kept)), None)
+        _kept[key] = found
+    return found
+
+
 def estimate(
     camera: Camera,
     markers: MarkerMap | npt.ArrayLike,
@@ -102,10 +135,10 @@ def estimate(
     """Returns the pose of one frame; ``RefusalError`` without a trusted one.
 
     markers: a ``MarkerMap``, or points (N, 3) on the tanker, m. pixels: (N, 2), in the order of ids. sigma_px: standard
-    deviation of column and row, a number or (N,), px; 0 or None: the parameter ``pixel_sigma_px``. For more than a few
-    frames make an ``Estimator`` once; its arguments are the other ones.
+    deviation of column and row, a number or (N,), px; 0 or None: the parameter ``pixel_sigma_px``. The other arguments are
+    those of ``Estimator``.
     """
-    estimator = Estimator(camera, markers, ids=ids, budget=budget, **parameters)
+    estimator = _estimator(camera, markers, ids, budget, parameters)
     return estimator.estimate(pixels, sigma_px, previous=previous)
 
 
@@ -121,7 +154,7 @@ def estimate_many(
     **parameters: bool | float | str,
 ) -> npt.NDArray[np.void]:
     """Returns the outcomes of many frames, each on its own, as ``Estimator.estimate_many`` does."""
-    estimator = Estimator(camera, markers, ids=ids, budget=budget, **parameters)
+    estimator = _estimator(camera, markers, ids, budget, parameters)
     return estimator.estimate_many(pixels, sigma_px, visible=visible)
 
 
