@@ -39,6 +39,9 @@
 // The best of all attitudes.
 #define TANKER_POSE_INITIALISATION_GLOBAL 4
 
+// The outcome of a frame with a trusted pose.
+#define TANKER_POSE_OUTCOME_OK 0
+
 // Whether a call did what it is for.
 typedef enum {
   // It did.
@@ -144,7 +147,7 @@ typedef struct {
   double chi_squared_limit;
   // Likelihood of the second-best pose relative to this one.
   double ambiguity;
-  // A constant of `tanker_pose/msg/EstimatorStatus`: 0 is a trusted pose; its name: `tanker_pose_outcome_name`.
+  // A constant of `tanker_pose/msg/EstimatorStatus`: `TANKER_POSE_OUTCOME_OK`, or why there is no pose; its name: `tanker_pose_outcome_name`.
   uint32_t outcome;
   // Of `chi_squared`.
   uint32_t degrees_of_freedom;
@@ -171,7 +174,7 @@ const char *tanker_pose_outcome_name(uint32_t outcome);
 //
 // # Safety
 // `camera` and `options` are null or point to such structs, `markers` to `marker_count` of them, `made` is null or points
-// to a place for a pointer, `message` is null or points to `message_size` bytes.
+// to a place for a pointer, `message` is null or points to `message_size` bytes. None of them overlap.
 TANKER_POSE_STATUS tanker_pose_create(const tanker_pose_Camera *camera,
                                       const tanker_pose_Marker *markers,
                                       size_t marker_count,
