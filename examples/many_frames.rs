@@ -15,30 +15,23 @@ const POINTS: usize = 6;
 /// Frames that one thread takes at a time.
 const CHUNK: usize = 256;
 
-/// What a caller keeps of a frame: rotation, translation, covariance, and the numbers to judge them by.
-struct Row {
-    numbers: [f64; 52],
-    code: OutcomeCode,
-}
+/// Numbers that a caller keeps of a frame: rotation, translation, covariance, and four to judge them by.
+const KEPT: usize = 52;
 
-impl Row {
-    fn new(code: OutcomeCode, solution: Option<&Solution>) -> Self {
-        let mut numbers = [f64::NAN; 52];
-        if let Some(found) = solution {
-            if code == OutcomeCode::Ok {
-                let rotation = found.camera_from_tanker.rotation.to_rotation_matrix();
-                numbers[..9].copy_from_slice(rotation.matrix().as_slice());
-                let at = &found.camera_from_tanker.translation.vector;
-                numbers[9..12].copy_from_slice(at.as_slice());
-                numbers[12..48].copy_from_slice(&found.covariance.row_major());
-            }
-            numbers[48] = found.rms_px;
-            numbers[49] = found.chi_squared;
-            numbers[50] = found.chi_squared_limit;
-            numbers[51] = found.ambiguity;
-        }
-        Self { numbers, code }
+fn keep(row: &mut [f64], code: OutcomeCode, solution: Option<&Solution>) {
+    row.fill(f64::NAN);
+    let Some(found) = solution else { return };
+    if code == OutcomeCode::Ok {
+        let rotation = found.camera_from_tanker.rotation.to_rotation_matrix();
+        row[..9].copy_from_slice(rotation.matrix().as_slice());
+        let at = &found.camera_from_tanker.translation.vector;
+        row[9..12].copy_from_slice(at.as_slice());
+        row[12..48].copy_from_slice(&found.covariance.row_major());
     }
+    row[48] = found.rms_px;
+    row[49] = found.chi_squared;
+    row[50] = found.chi_squared_limit;
+    row[51] = found.ambiguity;
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -59,12 +52,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         pixel_sigma_px: 0.5,
     };
     let begin = Instant::now();
-    let rows: Vec<Row> = numbers
-        .par_chunks(2 * POINTS * CHUNK)
-        .flat_map_iter(|chunk| {
+    let frames = numbers.len() / (2 * POINTS);
+    let (mut rows, mut codes) = (vec![0.0; KEPT * frames], vec![0; frames]);
+    rows.par_chunks_mut(KEPT * CHUNK)
+        .zip(codes.par_chunks_mut(CHUNK))
+        .zip(numbers.par_chunks(2 * POINTS * CHUNK))
+        .for_each(|((rows, codes), numbers)| {
             let (mut detections, mut room) = (Vec::new(), Vec::new());
-            let (bare, map) = (&bare, &map);
-            chunk.chunks_exact(2 * POINTS).map(move |pixels| {
+            let rows = rows.chunks_exact_mut(KEPT).zip(codes);
+            for ((row, kept), pixels) in rows.zip(numbers.chunks_exact(2 * POINTS)) {
                 detections.clear();
                 detections.extend(
                     (1..)
@@ -77,14 +73,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                         }),
                 );
                 let (code, solution) = bare.solve(&detections, |id| map.get(id), None, &mut room);
-                Row::new(code, solution.as_ref())
-            })
-        })
-        .collect();
+                keep(row, code, solution.as_ref());
+                *kept = code.number();
+            }
+        });
     let took_s = begin.elapsed().as_secs_f64();
-    let is_trusted = |row: &&Row| row.code == OutcomeCode::Ok && row.numbers[0].is_finite();
-    let trusted = rows.iter().filter(is_trusted).count();
-    eprintln!("{trusted} of {} frames trusted", rows.len());
-    println!("{:e}", took_s / rows.len() as f64);
+    let trusted = codes.iter().filter(|&&code| code == 0).count();
+    eprintln!("{trusted} of {frames} frames trusted");
+    println!("{:e}", took_s / frames as f64);
     Ok(())
 }

@@ -116,7 +116,7 @@ def main() -> None:
         "PoseLib": (poselib(points, one), SINGLE_CALLS),
     }
     times: dict[str, list[float]] = {name: [] for name in works}
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
         file = Path(folder) / "frames.f64"
         pixels.tofile(file)
         for _ in range(ROUNDS):

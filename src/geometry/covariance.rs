@@ -55,7 +55,7 @@ impl PoseCovariance {
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.0.iter().all(|value| value.is_finite())
-            && self.0 == self.0.transpose()
+            && is_symmetric(&self.0)
             && self.0.cholesky().is_some()
     }
 
@@ -127,6 +127,12 @@ pub(crate) fn principal_root(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     let eigen = covariance.symmetric_eigen();
     let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
     eigen.eigenvectors * Matrix6::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+}
+
+/// Whether a matrix of finite numbers equals its transpose.
+fn is_symmetric(matrix: &Matrix6<f64>) -> bool {
+    let is_same = |row, column| (matrix[(row, column)] - matrix[(column, row)]).abs() <= 0.0;
+    (0..6).all(|row| (0..row).all(|column| is_same(row, column)))
 }
 
 #[cfg(test)]
