@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let begin = Instant::now();
     let frames = numbers.len() / (2 * POINTS);
-    let (mut rows, mut codes) = (vec![0.0; KEPT * frames], vec![0; frames]);
+    let (mut rows, mut codes) = (vec![0.0; KEPT * frames], vec![None; frames]);
     rows.par_chunks_mut(KEPT * CHUNK)
         .zip(codes.par_chunks_mut(CHUNK))
         .zip(numbers.par_chunks(2 * POINTS * CHUNK))
@@ -74,11 +74,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 );
                 let (code, solution) = bare.solve(&detections, |id| map.get(id), None, &mut room);
                 keep(row, code, solution.as_ref());
-                *kept = code.number();
+                *kept = Some(code);
             }
         });
     let took_s = begin.elapsed().as_secs_f64();
-    let trusted = codes.iter().filter(|&&code| code == 0).count();
+    let trusted = codes
+        .iter()
+        .filter(|code| **code == Some(OutcomeCode::Ok))
+        .count();
     eprintln!("{trusted} of {frames} frames trusted");
     println!("{:e}", took_s / frames as f64);
     Ok(())
