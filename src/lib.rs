@@ -10,6 +10,7 @@
 //! answering           what the node does with a message, wherever it comes from
 //! recording           messages in files: MCAP and bags of rosbag2, and CDR, their bytes
 //! convert, messages   plain types <-> the messages of ROS
+//! calibration         marker map, mount and camera refined from all frames of a recording
 //! simulation          seeded approaches and synthetic detections, for tools and tests
 //! picture             the geometry of a frame in space, for display
 //! pipeline, config    the processing of one frame; raw parameters -> checked settings
@@ -27,6 +28,7 @@
 
 #[cfg(any(feature = "ros", feature = "bags"))]
 pub mod answering;
+pub mod calibration;
 pub mod camera;
 pub mod config;
 pub mod convert;

@@ -11,7 +11,7 @@ use crate::text::quoted;
 use crate::yaml::{self, Place, YamlError};
 
 /// The parameters that a file may name, in `OpenCV`'s order of the coefficients.
-const NAMES: [&str; 12] = [
+pub(super) const NAMES: [&str; 12] = [
     "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
 ];
 /// How many of them are in pixels; they come first.

@@ -22,6 +22,7 @@ mod info;
 mod model;
 #[cfg(test)]
 mod tests;
+mod written;
 
 pub use budget_file::{CalibrationBudget, CalibrationBudgetError};
 pub use calibration::{CALIBRATION_SIZE, CalibrationChange, FIRST_COEFFICIENT};

@@ -2,6 +2,8 @@
 //!
 //! ```text
 //! answer          one recording from its first message to its last
+//! flight          all frames of a recording, checked, for tools that look at them together
+//! reading         those frames as they are read, with the camera and the attitudes of their time
 //! routes          which of its topics are the node's inputs, and what of them can be used
 //! sinks           where the answers go: a recording that holds the inputs too
 //! summary         what was read, answered and left out
@@ -11,6 +13,8 @@
 //! (`solve_time`, latencies), and its time is the log time of the message in hand.
 
 mod answer;
+mod flight;
+mod reading;
 mod routes;
 mod sinks;
 mod summary;
@@ -22,7 +26,10 @@ use crate::answering::files::{Files, FilesError};
 use crate::answering::start::{StartError, effective_parameters};
 use crate::config::{self, Configuration, TogetherError};
 use crate::recording::WriteError;
+use crate::target::MarkerMap;
 
+pub use flight::FlightError;
+pub use reading::Flight;
 pub use summary::Summary;
 
 /// Why a recording cannot be answered.
@@ -73,5 +80,18 @@ impl Replay {
             configuration,
             warnings: start.warnings,
         })
+    }
+
+    /// Returns the marker map.
+    #[must_use]
+    pub fn map(&self) -> &MarkerMap {
+        &self.files.map
+    }
+
+    /// Returns the same with another marker map.
+    #[must_use]
+    pub fn with_map(mut self, map: MarkerMap) -> Self {
+        self.files.map = map;
+        self
     }
 }

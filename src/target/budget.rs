@@ -10,7 +10,7 @@ use super::{Marker, MarkerMapError, Tag};
 use crate::yaml::Place;
 
 /// Largest number of flex modes.
-pub const MAX_FLEX_MODES: usize = 4;
+pub const MAX_FLEX_MODES: usize = 12;
 /// Largest plausible standard deviation of a survey, m.
 const MAX_SURVEY_M: f64 = 1.0;
 /// Largest plausible standard deviation of a bent airframe, m.
@@ -22,7 +22,7 @@ const MAX_TIME_CONSTANT_S: f64 = 1.0e5;
 const MIN_TIME_CONSTANT_S: f64 = 0.01;
 /// Factor from the error of a tag to those of its corners. The corners move together; four independent errors of twice
 /// the size move their mean by the same amount.
-const CORNER_FACTOR: f64 = 2.0;
+pub(crate) const CORNER_FACTOR: f64 = 2.0;
 
 /// Errors of a map and the airframe, standard deviations.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -341,11 +341,12 @@ markers:
         for (more, expected) in slips {
             assert_eq!(refusal(&more), expected, "{more}");
         }
-        let many = [0, 1, 2, 3, 4].map(|i| format!("  - {{name: f{i}, sigma: 0.1, shape: []}}\n"));
+        let many: [_; 13] =
+            std::array::from_fn(|i| format!("  - {{name: f{i}, sigma: 0.1, shape: []}}\n"));
         let many = many.concat();
         assert_eq!(
             refusal(&format!("flex:\n{many}")),
-            "m.yaml:7:12: a map may have at most 4 flex modes, got 5"
+            "m.yaml:7:12: a map may have at most 12 flex modes, got 13"
         );
     }
 }

@@ -97,6 +97,12 @@ impl MarkerMap {
         &self.points
     }
 
+    /// Returns the tags, ascending id.
+    #[must_use]
+    pub fn tags(&self) -> &[Tag] {
+        &self.tags
+    }
+
     /// Returns the tag with this id; `None` if it is not on the map.
     #[must_use]
     pub fn tag(&self, id: u32) -> Option<&Tag> {

@@ -15,10 +15,13 @@ mod map;
 mod marker;
 mod tag;
 mod tag_file;
+mod written;
 
+pub(crate) use budget::CORNER_FACTOR;
 pub use budget::{Flex, MAX_FLEX_MODES, MapBudget};
 pub use check::MAX_COORDINATE_M;
 pub use error::MarkerMapError;
 pub use map::{MarkerMap, NamedPoint};
 pub use marker::Marker;
 pub use tag::Tag;
+pub use written::{BodyChange, MAP_ERROR, MapChange};

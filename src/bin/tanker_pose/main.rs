@@ -1,5 +1,7 @@
 //! `tanker_pose`: tools around the node, one file a subcommand. Those that talk ROS need the feature `ros`.
 
+#[cfg(feature = "bags")]
+mod calibrate_map;
 mod check;
 #[cfg(feature = "ros")]
 mod demo;
@@ -56,6 +58,8 @@ enum Tool {
     Replay(Box<replay::Arguments>),
     #[cfg(feature = "bags")]
     Evaluate(Box<evaluate::Arguments>),
+    #[cfg(feature = "bags")]
+    CalibrateMap(Box<calibrate_map::Arguments>),
     /// Check marker map, camera and error budget together before flight
     Check(Box<check::Arguments>),
     /// Reproduce the paper's experiments: tables and plots
@@ -76,6 +80,8 @@ fn main() -> ExitCode {
         Tool::Replay(arguments) => return replay::run(&arguments),
         #[cfg(feature = "bags")]
         Tool::Evaluate(arguments) => return evaluate::run(&arguments),
+        #[cfg(feature = "bags")]
+        Tool::CalibrateMap(arguments) => return calibrate_map::run(&arguments),
         // Its exit code also says what it found.
         Tool::Check(arguments) => return check::run(&arguments),
         Tool::Solve(arguments) => solve::run(&arguments).map_err(Into::into),

@@ -33,8 +33,17 @@ impl RosOptions {
     /// # Errors
     /// [`ArgumentError`] when one is malformed or not supported.
     pub fn read(&self) -> Result<Arguments, ArgumentError> {
+        self.read_with(&[])
+    }
+
+    /// Returns the ROS arguments with more of them, which win.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with(&self, more: &[String]) -> Result<Arguments, ArgumentError> {
         let mut all = vec!["--ros-args".to_owned()];
         all.extend(self.ros_args.iter().cloned());
+        all.extend(more.iter().cloned());
         Ok(Arguments::split(&all)?.0)
     }
 }

@@ -45,6 +45,7 @@ impl InDoubt<'_> {
         match self.budget.modes() {
             0..=3 => self.run_with::<T, 3>(task),
             4..=6 => self.run_with::<T, 6>(task),
+            7..=18 => self.run_with::<T, 18>(task),
             _ => self.run_with::<T, { super::MAX_MODES }>(task),
         }
     }
