@@ -23,12 +23,12 @@ pub enum FlightError {
     /// A remap.
     #[error(transparent)]
     Names(#[from] NamesError),
-    /// No camera info before the first detections, and none was given.
-    #[error("no camera info on {topic}{hint}")]
+    /// No camera info, and none was given.
+    #[error("no camera info on {topic}, and no calibration file given{hint}")]
     NoCamera {
         /// The topic.
         topic: String,
-        /// Which others there are.
+        /// Which others there are, or what is wrong with the recording.
         hint: String,
     },
     /// The camera info cannot be used.
@@ -54,9 +54,8 @@ impl Replay {
     /// [`FlightError`] when there is no usable frame. What cannot be read is in [`Flight::skipped`].
     pub fn flight(
         self,
-        recording: Recording,
+        mut recording: Recording,
         given: Option<CameraInfo>,
-        mut progress: impl FnMut(u64, u64),
     ) -> Result<Flight, FlightError> {
         let routes = Routes::new(&self.configuration, &self.names)?;
         let configuration = &self.configuration;
@@ -73,8 +72,7 @@ impl Replay {
                 reading.skip(format!("{}: {words}", clip(&topic.name)));
             }
         }
-        let mut recording = recording;
-        while let Some(item) = recording.next() {
+        for item in &mut recording {
             match item {
                 Ok(message) => {
                     reading.settle(message.log_time_ns.saturating_sub(PATIENCE_NS));
@@ -86,21 +84,26 @@ impl Replay {
                 }
                 Err(damage) => reading.skip(damage.to_string()),
             }
-            let (size, passed) = recording.size_and_passed();
-            progress(size, passed);
         }
         reading.settle(u64::MAX);
-        let hint = |route: Route| {
+        let hint = |route: Route, name: &str| {
             let kind = route.type_name();
-            let others: Vec<&str> = topics
-                .iter()
-                .filter(|topic| topic.type_name == kind)
-                .map(|topic| topic.name.as_str())
-                .collect();
-            match others.first() {
-                None => format!("; the recording has no topic of {kind}"),
-                Some(other) => format!("; of {kind} the recording has {}: use -r", clip(other)),
+            let mut others = topics.iter().filter(|topic| topic.type_name == kind);
+            match others.clone().find(|topic| topic.name == *name) {
+                Some(_) => "; the topic has no messages".to_owned(),
+                None => others.next().map_or_else(
+                    || format!("; the recording has no topic of {kind}"),
+                    |other| {
+                        let other = clip(&other.name);
+                        format!("; of {kind} the recording has {other}: use -r")
+                    },
+                ),
             }
+        };
+        // What could not be read may be why; else it is the name.
+        let first = |reading: &Reading| {
+            let first = reading.skipped.first();
+            first.map(|words| format!("; the first problem: {words}"))
         };
         let named = |wanted: fn(Route) -> bool| {
             let found = routes.iter().find(|(_, route)| wanted(*route));
@@ -111,16 +114,13 @@ impl Replay {
         };
         let Some(info) = reading.info.take() else {
             let (topic, route) = named(|route| route == Route::CameraInfo);
-            let hint = hint(route);
+            let hint = first(&reading).unwrap_or_else(|| hint(route, &topic));
             return Err(FlightError::NoCamera { topic, hint });
         };
         let camera = Camera::from_info(&info, reading.settings.rectified)?;
         if reading.read.is_empty() {
             let (topic, route) = named(|route| matches!(route, Route::Detections(_)));
-            let hint = reading.skipped.first().map_or_else(
-                || hint(route),
-                |first| format!("; the first problem: {first}"),
-            );
+            let hint = first(&reading).unwrap_or_else(|| hint(route, &topic));
             return Err(FlightError::NoFrame { topic, hint });
         }
         let modes = match &self.files.calibration {

@@ -83,6 +83,10 @@ enum Error {
         "--intrinsics needs detections in the raw image: with `rectified` the parameters K and D that a camera file holds are not seen"
     )]
     Rectified,
+    #[error(
+        "--intrinsics needs a sigma of what the calibration may have wrong: focal_length_sigma, principal_point_sigma_px, k1_sigma, k2_sigma or calibration_budget_file"
+    )]
+    ExactCamera,
     #[error(transparent)]
     Files(#[from] files::FilesError),
 }
@@ -120,12 +124,16 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         replay = replay.with_map(map);
     }
     let recording = Recording::open(&arguments.recording)?;
-    let flight = replay.flight(recording, given, |_, _| {})?;
+    let flight = replay.flight(recording, given)?;
     for words in &flight.skipped {
         eprintln!("tanker_pose: skipped: {words}");
     }
     if arguments.intrinsics && flight.settings.rectified {
         return Err(Error::Rectified);
+    }
+    let budget = flight.estimator.budget();
+    if arguments.intrinsics && budget.is_none_or(|budget| budget.calibration().is_empty()) {
+        return Err(Error::ExactCamera);
     }
     let settings = CalibrationSettings {
         intrinsics: arguments.intrinsics,
