@@ -206,10 +206,16 @@ impl Context<'_> {
         }
         if let Some(reason) = &round.first_reason {
             warnings.push(format!(
-                "{} of {} frames were not used; the first has: {reason}",
+                "{} of {} frames not used; the first: {reason}",
                 self.recorded.len() - frames.len(),
                 self.recorded.len()
             ));
+        }
+        if round.noise.factor_of_stated < LEAST_FACTOR {
+            warnings.push(
+                "the detections have next to no noise: of the detector the recording tells nothing"
+                    .to_owned(),
+            );
         }
         if round.far_attitudes > 0 {
             warnings.push(format!(

@@ -67,9 +67,15 @@ impl Replay {
         };
         let mut reading = Reading::new(configuration, &reader, map, given);
         let topics = recording.topics().to_vec();
+        // What could not be read, which may be why there is no camera info. Frames are refused for lack of one.
+        let mut unread = None;
+        let mut skip = |reading: &mut Reading, words: String| {
+            unread.get_or_insert_with(|| words.clone());
+            reading.skip(words);
+        };
         for topic in &topics {
             if let Err(words) = routes.of(topic) {
-                reading.skip(format!("{}: {words}", clip(&topic.name)));
+                skip(&mut reading, format!("{}: {words}", clip(&topic.name)));
             }
         }
         for item in &mut recording {
@@ -79,10 +85,11 @@ impl Replay {
                     if let Ok(Some(route)) = routes.of(&message.topic)
                         && let Err(error) = reading.take(route, &message)
                     {
-                        reading.skip(format!("{}: {error}", clip(&message.topic.name)));
+                        let words = format!("{}: {error}", clip(&message.topic.name));
+                        skip(&mut reading, words);
                     }
                 }
-                Err(damage) => reading.skip(damage.to_string()),
+                Err(damage) => skip(&mut reading, damage.to_string()),
             }
         }
         reading.settle(u64::MAX);
@@ -100,11 +107,7 @@ impl Replay {
                 ),
             }
         };
-        // What could not be read may be why; else it is the name.
-        let first = |reading: &Reading| {
-            let first = reading.skipped.first();
-            first.map(|words| format!("; the first problem: {words}"))
-        };
+        let problem = |words: &String| format!("; the first problem: {words}");
         let named = |wanted: fn(Route) -> bool| {
             let found = routes.iter().find(|(_, route)| wanted(*route));
             found.map_or_else(
@@ -114,13 +117,14 @@ impl Replay {
         };
         let Some(info) = reading.info.take() else {
             let (topic, route) = named(|route| route == Route::CameraInfo);
-            let hint = first(&reading).unwrap_or_else(|| hint(route, &topic));
+            let hint = unread.as_ref().map_or_else(|| hint(route, &topic), problem);
             return Err(FlightError::NoCamera { topic, hint });
         };
         let camera = Camera::from_info(&info, reading.settings.rectified)?;
         if reading.read.is_empty() {
             let (topic, route) = named(|route| matches!(route, Route::Detections(_)));
-            let hint = first(&reading).unwrap_or_else(|| hint(route, &topic));
+            let first = reading.skipped.first();
+            let hint = first.map_or_else(|| hint(route, &topic), problem);
             return Err(FlightError::NoFrame { topic, hint });
         }
         let modes = match &self.files.calibration {
