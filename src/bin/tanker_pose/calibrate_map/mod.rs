@@ -90,10 +90,9 @@ enum Error {
     )]
     Rectified,
     #[error(
-        "--intrinsics has nothing to refine: no parameter of the camera has a sigma; state what may be wrong with \
-         `calibration_budget_file`, `focal_length_sigma`, `principal_point_sigma_px`, `k1_sigma` or `k2_sigma`"
+        "--intrinsics needs a sigma of what the calibration may have wrong: focal_length_sigma, principal_point_sigma_px, k1_sigma, k2_sigma or calibration_budget_file"
     )]
-    NoCameraSigma,
+    ExactCamera,
     #[error(transparent)]
     Files(#[from] files::FilesError),
 }
@@ -131,12 +130,16 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         replay = replay.with_map(map);
     }
     let recording = Recording::open(&arguments.recording)?;
-    let flight = replay.flight(recording, given, |_, _| {})?;
+    let flight = replay.flight(recording, given)?;
     for words in &flight.skipped {
         eprintln!("tanker_pose: skipped: {words}");
     }
     if arguments.intrinsics && flight.settings.rectified {
         return Err(Error::Rectified);
+    }
+    let budget = flight.estimator.budget();
+    if arguments.intrinsics && budget.is_none_or(|budget| budget.calibration().is_empty()) {
+        return Err(Error::ExactCamera);
     }
     let settings = CalibrationSettings {
         intrinsics: arguments.intrinsics,
@@ -150,9 +153,6 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         &flight.frames,
         &settings,
     )?;
-    if arguments.intrinsics && found.camera.is_none() {
-        return Err(Error::NoCameraSigma);
-    }
     let folder = arguments.output.clone().unwrap_or_else(|| {
         let mut name = arguments
             .recording
