@@ -63,4 +63,4 @@ def test_misuse_gives_a_status_and_words(tmp_path: Path) -> None:
     program = compiled(Path(__file__).parent / "fixtures" / "c" / "misuse.c", tmp_path / "misuse")
     done = run(program)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "fx" in done.stdout and "pixel_sigma_px" in done.stdout and "marker" in done.stdout
+    assert "k[0]" in done.stdout and "pixel_sigma_px" in done.stdout and "marker" in done.stdout

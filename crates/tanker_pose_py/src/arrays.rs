@@ -72,7 +72,8 @@ fn converted<'py, T: numpy::Element>(
         return Ok(array.try_readonly()?);
     }
     let wanted = ["C_CONTIGUOUS", "ALIGNED"];
-    let array = numpy::get_array_module(py)?.call_method1("require", (value, dtype, wanted))?;
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("require", (value, dtype, wanted))?;
     Ok(array.cast_into::<PyArrayDyn<T>>()?.try_readonly()?)
 }
 
