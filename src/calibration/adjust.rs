@@ -1,6 +1,6 @@
 //! The most probable poses and shared unknowns: Levenberg–Marquardt, the poses eliminated (Schur complement).
 
-use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn, SMatrix};
+use nalgebra::{Cholesky, Const, DMatrix, DVector, Dyn};
 
 use super::CalibrateError;
 use super::model::{Frame, Model, OWN, Own, OwnMatrix};
@@ -288,6 +288,6 @@ fn finish(
 }
 
 /// Returns the inverse information of a frame's own unknowns.
-pub(super) fn own_covariance(sums: &FrameSums) -> Option<SMatrix<f64, OWN, OWN>> {
+pub(super) fn own_covariance(sums: &FrameSums) -> Option<OwnMatrix> {
     Some(sums.factor(0.0)?.inverse())
 }

@@ -19,14 +19,42 @@ const STAGES: usize = 12;
 const NEWTON_STEPS: usize = 30;
 /// m²; ten micrometres, the last digit of a written map.
 const LEAST_VARIANCE_M2: f64 = 1e-10;
+/// Steps of 1 m in which a mode's sigma is written, and of 1 in which its shape is.
+const SIGMA_STEPS: f64 = 1e5;
+const SHAPE_STEPS: f64 = 1e4;
 
 /// A statement that a map can make.
 #[derive(Debug, Clone)]
 pub(super) struct Statement {
     /// Variance of each coordinate, by body.
     pub(super) variances: Vec<f64>,
-    /// Displacements of all coordinates at one sigma.
-    pub(super) modes: Vec<DVector<f64>>,
+    pub(super) modes: Vec<Mode>,
+}
+
+/// A displacement of all coordinates together, with the digits that are written.
+#[derive(Debug, Clone)]
+pub(super) struct Mode {
+    /// m, of the body that moves most.
+    pub(super) sigma_m: f64,
+    /// Displacements, the largest of which is 1.
+    pub(super) shape: DVector<f64>,
+}
+
+impl Mode {
+    /// Returns a displacement at one sigma as it is written.
+    fn rounded(shift: &DVector<f64>) -> Self {
+        let bodies = 0..shift.len() / 3;
+        let largest = bodies.map(|body| shift.fixed_rows::<3>(3 * body).norm());
+        let sigma_m = (largest.fold(0.0, f64::max) * SIGMA_STEPS).ceil() / SIGMA_STEPS;
+        // Adding zero, because a negative one would be written with its sign.
+        let shape = shift.map(|part| (part / sigma_m * SHAPE_STEPS).round() / SHAPE_STEPS + 0.0);
+        Self { sigma_m, shape }
+    }
+
+    /// Returns the displacement at one sigma, m.
+    fn shift(&self) -> DVector<f64> {
+        &self.shape * self.sigma_m
+    }
 }
 
 impl Statement {
@@ -36,7 +64,8 @@ impl Statement {
         let own = DVector::from_fn(size, |i, _| self.variances[i / 3]);
         let mut sum = DMatrix::from_diagonal(&own);
         for mode in &self.modes {
-            sum += mode * mode.transpose();
+            let shift = mode.shift();
+            sum += &shift * shift.transpose();
         }
         sum
     }
@@ -47,9 +76,13 @@ pub(super) fn dominate(covariance: &DMatrix<f64>, most_modes: usize) -> Statemen
     let bodies = covariance.nrows() / 3;
     let count = most_modes.min(3 * bodies);
     let modes = common_modes(covariance, count);
+    // A mode of nothing has no shape.
+    let shifts = modes.iter().filter(|shift| shift.amax() > 0.0);
+    let modes: Vec<Mode> = shifts.map(Mode::rounded).collect();
     let mut rest = covariance.clone();
     for mode in &modes {
-        rest -= mode * mode.transpose();
+        let shift = mode.shift();
+        rest -= &shift * shift.transpose();
     }
     let variances = least_diagonal(&rest);
     Statement { variances, modes }

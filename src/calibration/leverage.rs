@@ -3,11 +3,11 @@
 //! The residual of a point has the covariance `σ² 1 − J C Jᵀ`, `C` the covariance of all that was fitted. The trace of
 //! that over `σ²` is the point's degrees of freedom; they add up to those of the whole adjustment.
 
-use nalgebra::{DMatrix, Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, SMatrix, Vector2};
 
 use super::adjust::State;
 use super::adjust::{FrameSums, own_covariance};
-use super::model::{Model, OWN, Sight};
+use super::model::{Model, OWN, OwnMatrix, Sight};
 
 /// Below this share of freedom a residual says nothing of its own detection.
 const LEAST_FREEDOM: f64 = 1e-3;
@@ -116,36 +116,41 @@ pub(super) fn residuals(
 fn corner_sums(
     points: &[Residual],
     sights: &[Sight],
-    own: &nalgebra::SMatrix<f64, OWN, OWN>,
+    own: &OwnMatrix,
     tag_of: &dyn Fn(u32) -> Option<u32>,
 ) -> CornerSums {
     let tags: Vec<Option<u32>> = points.iter().map(|point| tag_of(point.id)).collect();
-    let is_pair = |i: usize, j: usize| i != j && tags[i].is_some() && tags[i] == tags[j];
-    let count = points.len();
-    let any = (0..count).any(|i| (0..i).any(|j| is_pair(i, j)));
-    if !any {
+    let mut sums = CornerSums::default();
+    let mut squares = OwnMatrix::zeros();
+    let (mut pairs, mut pairs_twice) = (OwnMatrix::zeros(), OwnMatrix::zeros());
+    for (i, sight) in sights.iter().enumerate() {
+        // K times residuals and derivatives: the sum over the other corners.
+        let (mut others, mut by_others) = (Vector2::zeros(), SMatrix::<f64, 2, OWN>::zeros());
+        for (j, other) in sights.iter().enumerate() {
+            if i != j && tags[i].is_some() && tags[i] == tags[j] {
+                others += points[j].px / points[j].sigma_px;
+                by_others += other.by_own / other.sigma_px;
+                sums.mkmk += 2.0;
+            }
+        }
+        let (residual, by) = (
+            points[i].px / points[i].sigma_px,
+            sight.by_own / sight.sigma_px,
+        );
+        sums.own += residual.norm_squared();
+        sums.pairs += residual.dot(&others);
+        sums.m += 2.0;
+        squares += by.transpose() * by;
+        pairs += by.transpose() * by_others;
+        pairs_twice += by_others.transpose() * by_others;
+    }
+    if sums.mkmk == 0.0 {
         return CornerSums::default();
     }
-    let by: Vec<_> = sights
-        .iter()
-        .map(|sight| sight.by_own / sight.sigma_px)
-        .collect();
-    let left = DMatrix::from_fn(2 * count, 2 * count, |i, j| {
-        let fitted = (by[i / 2].row(i % 2) * own * by[j / 2].row(j % 2).transpose())[(0, 0)];
-        f64::from(u8::from(i == j)) - fitted
-    });
-    let pairs = DMatrix::from_fn(2 * count, 2 * count, |i, j| {
-        f64::from(u8::from(i % 2 == j % 2 && is_pair(i / 2, j / 2)))
-    });
-    let residuals = nalgebra::DVector::from_fn(2 * count, |i, _| {
-        points[i / 2].px[i % 2] / points[i / 2].sigma_px
-    });
-    let left_pairs = &left * &pairs;
-    CornerSums {
-        own: residuals.norm_squared(),
-        pairs: residuals.dot(&(&pairs * &residuals)),
-        m: left.trace(),
-        mk: left_pairs.trace(),
-        mkmk: left_pairs.tr_mul(&left_pairs.transpose()).trace(),
-    }
+    // With M = 1 − J C Jᵀ; K has no trace, and KK was counted above.
+    sums.m -= (own * squares).trace();
+    sums.mk -= (own * pairs).trace();
+    let twice = own * pairs;
+    sums.mkmk += (twice * twice).trace() - 2.0 * (own * pairs_twice).trace();
+    sums
 }

@@ -113,6 +113,20 @@ pub enum CalibrateError {
         /// Why the first one was refused; may be empty.
         reason: String,
     },
+    /// The residuals have hardly any degrees of freedom.
+    #[error(
+        "the residuals of {frames} frames do not tell the detector's noise: more frames or more markers are needed"
+    )]
+    TooLittle {
+        /// Frames that can be used.
+        frames: usize,
+    },
+    /// Leaving out wrong detections does not end.
+    #[error("after {rounds} rounds of leaving out wrong detections there are still more")]
+    TooManyWrong {
+        /// Rounds.
+        rounds: usize,
+    },
     /// A flex mode changes too fast for the length of the recording.
     #[error(
         "flex mode `{name}` with a time constant of {time_constant_s} s over {length_s:.0} s needs {need} amplitudes, at most {most} can be estimated: use a shorter part of the recording"

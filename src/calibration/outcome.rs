@@ -92,7 +92,7 @@ impl Movement {
                 "not moved: many of its detections were left out as wrong; check its id and its survey"
             }
             Self::NoAttitudes => {
-                "not moved: the recording has no attitudes of both aircraft, without which no image tells the mount"
+                "not moved: no frame has attitudes of both aircraft (parameters attitude and reported_attitude_sigma_deg), and without them no image tells the mount"
             }
         }
     }

@@ -1,8 +1,8 @@
 //! From an adjustment to what is written: map, camera and mount, each with what is then still wrong.
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use nalgebra::{DMatrix, Rotation3, Vector3};
 
-use super::dominate::dominate;
+use super::dominate::{Mode, dominate};
 use super::outcome::{CameraOutcome, MapOutcome, MountOutcome, Movement, Parameter};
 use super::unknowns::{BodyId, Unknowns};
 use super::{CalibrateError, MountPrior};
@@ -77,25 +77,18 @@ impl Results<'_> {
         })
     }
 
-    /// Returns a mode as a map states it: the largest displacement is 1.
-    fn map_error(&self, index: usize, mode: &DVector<f64>) -> Flex {
+    /// Returns a mode as a map states it.
+    fn map_error(&self, index: usize, mode: &Mode) -> Flex {
         let bodies = self.unknowns.bodies.iter().enumerate();
-        let shifts: Vec<_> = bodies
-            .map(|(body, of)| (of, mode.fixed_rows::<3>(3 * body).into_owned()))
-            .collect();
-        let sigma_m = shifts
-            .iter()
-            .map(|(_, shift)| shift.norm())
-            .fold(0.0, f64::max);
-        let shape = shifts.iter().flat_map(|(body, shift)| {
-            let shift = shift / sigma_m.max(f64::MIN_POSITIVE);
+        let shape = bodies.flat_map(|(index, body)| {
+            let shift = mode.shape.fixed_rows::<3>(3 * index).into_owned();
             body.points.iter().map(move |point| (*point, shift))
         });
         let mut shape: Vec<_> = shape.collect();
         shape.sort_unstable_by_key(|(point, _)| *point);
         Flex {
             name: format!("{MAP_ERROR}{}", index + 1),
-            sigma_m,
+            sigma_m: mode.sigma_m,
             time_constant_s: None,
             shape,
         }

@@ -27,8 +27,10 @@ const LEAST_FRAMES: usize = 10;
 const SIGMA_ROUNDS: usize = 5;
 /// Relative change of the sigma, and of what noise that lasts adds, at which it has.
 const SETTLED: f64 = 0.02;
+/// Sigmas are not taken for smaller than this share of what was stated: without noise they would end at zero.
+const LEAST_FACTOR: f64 = 0.02;
 /// Rounds of leaving out detections.
-const REJECT_ROUNDS: usize = 4;
+const REJECT_ROUNDS: usize = 10;
 /// Points of a frame below which it has no pose that checks itself.
 const LEAST_POINTS: usize = 4;
 /// Share of a marker's detections that may be left out as wrong.
@@ -66,7 +68,7 @@ pub fn calibrate(
     let mut lasting = 1.0;
     let mut round = context.round(factor, lasting)?;
     for _ in 1..SIGMA_ROUNDS {
-        let next = round.noise.factor_of_stated;
+        let next = round.noise.factor_of_stated.max(LEAST_FACTOR);
         let next_lasting = round
             .noise
             .lasting_factor(usual_spacing_s(&round.residuals))
@@ -100,6 +102,8 @@ struct Round {
     cost: f64,
     /// By point: detections, and how many of them were left out.
     left_out: BTreeMap<u32, (usize, usize)>,
+    /// Why the first frame that is not used was refused.
+    first_reason: Option<String>,
     far_attitudes: usize,
 }
 
@@ -144,7 +148,9 @@ impl Context<'_> {
                 &tag_of,
             )
             .ok_or(singular.clone())?;
-            let noise = detector_noise(&residuals, factor).ok_or_else(|| too_few(0))?;
+            let noise = detector_noise(&residuals, factor).ok_or(CalibrateError::TooLittle {
+                frames: residuals.len(),
+            })?;
             // Too small sigmas are no reason to leave out what they call wrong.
             let allowed = limit * (noise.factor_of_stated / factor).max(1.0).powi(2);
             let (kept, count) =
@@ -157,6 +163,7 @@ impl Context<'_> {
                     noise,
                     cost,
                     left_out,
+                    first_reason: selected.first_reason,
                     far_attitudes: selected.far_attitudes,
                 });
             }
@@ -165,8 +172,8 @@ impl Context<'_> {
             }
             state = kept;
         }
-        Err(CalibrateError::NoConvergence {
-            iterations: REJECT_ROUNDS,
+        Err(CalibrateError::TooManyWrong {
+            rounds: REJECT_ROUNDS,
         })
     }
 
@@ -196,6 +203,19 @@ impl Context<'_> {
                 "{} moves by {:.1} times the sigma that its movement should have: its prior is too small, or something else is wrong",
                 parameter.name, parameter.sigmas
             ));
+        }
+        if let Some(reason) = &round.first_reason {
+            warnings.push(format!(
+                "{} of {} frames not used; the first: {reason}",
+                self.recorded.len() - frames.len(),
+                self.recorded.len()
+            ));
+        }
+        if round.noise.factor_of_stated < LEAST_FACTOR {
+            warnings.push(
+                "the detections have next to no noise: of the detector the recording tells nothing"
+                    .to_owned(),
+            );
         }
         if round.far_attitudes > 0 {
             warnings.push(format!(

@@ -23,12 +23,12 @@ pub enum FlightError {
     /// A remap.
     #[error(transparent)]
     Names(#[from] NamesError),
-    /// No camera info before the first detections, and none was given.
-    #[error("no camera info on {topic}{hint}")]
+    /// No camera info, and none was given.
+    #[error("no camera info on {topic}, and no calibration file given{hint}")]
     NoCamera {
         /// The topic.
         topic: String,
-        /// Which others there are, or what could not be read.
+        /// Which others there are, or what is wrong with the recording.
         hint: String,
     },
     /// The camera info cannot be used.
@@ -39,7 +39,7 @@ pub enum FlightError {
     NoFrame {
         /// The topic.
         topic: String,
-        /// Which others there are, or what could not be read or used.
+        /// Which others there are, or why the first one cannot.
         hint: String,
     },
 }
@@ -54,9 +54,8 @@ impl Replay {
     /// [`FlightError`] when there is no usable frame. What cannot be read is in [`Flight::skipped`].
     pub fn flight(
         self,
-        recording: Recording,
+        mut recording: Recording,
         given: Option<CameraInfo>,
-        mut progress: impl FnMut(u64, u64),
     ) -> Result<Flight, FlightError> {
         let routes = Routes::new(&self.configuration, &self.names)?;
         let configuration = &self.configuration;
@@ -68,44 +67,47 @@ impl Replay {
         };
         let mut reading = Reading::new(configuration, &reader, map, given);
         let topics = recording.topics().to_vec();
+        // What could not be read, which may be why there is no camera info. Frames are refused for lack of one.
+        let mut unread = None;
+        let mut skip = |reading: &mut Reading, words: String| {
+            unread.get_or_insert_with(|| words.clone());
+            reading.skip(words);
+        };
         for topic in &topics {
             if let Err(words) = routes.of(topic) {
-                reading.skip(format!("{}: {words}", clip(&topic.name)));
+                skip(&mut reading, format!("{}: {words}", clip(&topic.name)));
             }
         }
-        let mut recording = recording;
-        while let Some(item) = recording.next() {
+        for item in &mut recording {
             match item {
                 Ok(message) => {
                     reading.settle(message.log_time_ns.saturating_sub(PATIENCE_NS));
                     if let Ok(Some(route)) = routes.of(&message.topic)
                         && let Err(error) = reading.take(route, &message)
                     {
-                        reading.skip(format!("{}: {error}", clip(&message.topic.name)));
+                        let words = format!("{}: {error}", clip(&message.topic.name));
+                        skip(&mut reading, words);
                     }
                 }
-                Err(damage) => reading.skip(damage.to_string()),
+                Err(damage) => skip(&mut reading, damage.to_string()),
             }
-            let (size, passed) = recording.size_and_passed();
-            progress(size, passed);
         }
         reading.settle(u64::MAX);
-        let first_problem = reading.skipped.first().cloned();
-        let hint = |route: Route| {
-            if let Some(words) = &first_problem {
-                return format!("; the first problem: {words}");
-            }
+        let hint = |route: Route, name: &str| {
             let kind = route.type_name();
-            match topics.iter().find(|topic| topic.type_name == kind) {
-                None => format!("; the recording has no topic of {kind}"),
-                Some(other) => {
-                    format!(
-                        "; of {kind} the recording has {}: use -r",
-                        clip(&other.name)
-                    )
-                }
+            let mut others = topics.iter().filter(|topic| topic.type_name == kind);
+            match others.clone().find(|topic| topic.name == *name) {
+                Some(_) => "; the topic has no messages".to_owned(),
+                None => others.next().map_or_else(
+                    || format!("; the recording has no topic of {kind}"),
+                    |other| {
+                        let other = clip(&other.name);
+                        format!("; of {kind} the recording has {other}: use -r")
+                    },
+                ),
             }
         };
+        let problem = |words: &String| format!("; the first problem: {words}");
         let named = |wanted: fn(Route) -> bool| {
             let found = routes.iter().find(|(_, route)| wanted(*route));
             found.map_or_else(
@@ -115,13 +117,14 @@ impl Replay {
         };
         let Some(info) = reading.info.take() else {
             let (topic, route) = named(|route| route == Route::CameraInfo);
-            let hint = hint(route);
+            let hint = unread.as_ref().map_or_else(|| hint(route, &topic), problem);
             return Err(FlightError::NoCamera { topic, hint });
         };
         let camera = Camera::from_info(&info, reading.settings.rectified)?;
         if reading.read.is_empty() {
             let (topic, route) = named(|route| matches!(route, Route::Detections(_)));
-            let hint = hint(route);
+            let first = reading.skipped.first();
+            let hint = first.map_or_else(|| hint(route, &topic), problem);
             return Err(FlightError::NoFrame { topic, hint });
         }
         let modes = match &self.files.calibration {

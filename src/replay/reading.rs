@@ -33,8 +33,6 @@ pub struct Flight {
     pub estimator: Estimator,
     /// By time, from the first one on.
     pub frames: Vec<RecordedFrame>,
-    /// Frames with the attitudes of both aircraft.
-    pub with_attitudes: usize,
     /// What could not be read or used, in words; of many the first.
     pub skipped: Vec<String>,
 }
@@ -239,10 +237,6 @@ impl<'a> Reading<'a> {
                 ..frame
             })
             .collect();
-        let with_attitudes = frames
-            .iter()
-            .filter(|frame| frame.receiver_from_tanker.is_some())
-            .count();
         Flight {
             info,
             camera,
@@ -250,7 +244,6 @@ impl<'a> Reading<'a> {
             settings: self.settings,
             estimator,
             frames,
-            with_attitudes,
             skipped: self.skipped,
         }
     }

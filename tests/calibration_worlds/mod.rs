@@ -1,7 +1,10 @@
 //! Recorded approaches to tankers whose markers are not where the map has them, seen by cameras that are not as
 //! calibrated.
 
-use nalgebra::{Rotation3, Vector3};
+pub mod poses;
+pub mod tags;
+
+use nalgebra::{DVector, Rotation3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -10,7 +13,7 @@ use tanker_pose::calibration::{
 };
 use tanker_pose::camera::{CalibrationChange, Camera};
 use tanker_pose::config::CalibrationSigmas;
-use tanker_pose::estimation::{Estimator, EstimatorSettings};
+use tanker_pose::estimation::{Estimator, EstimatorSettings, Observation};
 use tanker_pose::geometry::optical_from_body;
 use tanker_pose::pipeline::{Detection, error_budget, observe};
 use tanker_pose::simulation::{Approach, ApproachSettings, paper_camera};
@@ -18,6 +21,8 @@ use tanker_pose::target::{Marker, MarkerMap};
 
 /// Survey of every marker, m.
 pub const SURVEY_M: f64 = 0.05;
+/// What the detector states, whatever its noise is, px.
+const STATED_PX: f64 = 0.5;
 
 /// What is wrong in a world, 1 sigma, and how it is recorded.
 #[derive(Clone, Copy)]
@@ -26,7 +31,6 @@ pub struct Plan {
     pub mount_deg: f64,
     pub attitude_bias_deg: f64,
     pub sigma_px: f64,
-    pub stated_px: f64,
     pub noise_time_constant_s: f64,
     /// One detection of every such frame is off by 30 px.
     pub wrong_every: Option<u32>,
@@ -34,20 +38,18 @@ pub struct Plan {
     pub intrinsics: bool,
 }
 
-impl Default for Plan {
-    fn default() -> Self {
-        Self {
-            focal_length: 0.0,
-            mount_deg: 0.0,
-            attitude_bias_deg: 0.0,
-            sigma_px: 0.5,
-            stated_px: 0.5,
-            noise_time_constant_s: 0.0,
-            wrong_every: None,
-            rate_hz: 2.0,
-            intrinsics: false,
-        }
-    }
+impl Plan {
+    /// Only the markers are off.
+    pub const USUAL: Self = Self {
+        focal_length: 0.0,
+        mount_deg: 0.0,
+        attitude_bias_deg: 0.0,
+        sigma_px: 0.5,
+        noise_time_constant_s: 0.0,
+        wrong_every: None,
+        rate_hz: 2.0,
+        intrinsics: false,
+    };
 }
 
 /// One world with its recording.
@@ -151,7 +153,7 @@ impl World {
             let reported = (off * optical_from_body()).inverse() * noise * rotation;
             world.frames.push(RecordedFrame {
                 time_s: frame.time_s,
-                observations: world.observations(
+                observations: observations(
                     &world.believed_camera,
                     &world.believed,
                     &frame.detections,
@@ -175,22 +177,6 @@ impl World {
         Approach::new(settings, self.true_camera.clone(), self.truth.clone())
     }
 
-    pub fn observations(
-        &self,
-        camera: &Camera,
-        map: &MarkerMap,
-        detections: &[Detection],
-    ) -> Vec<tanker_pose::estimation::Observation> {
-        let stated: Vec<Detection> = detections
-            .iter()
-            .map(|seen| Detection {
-                sigma_px: self.plan.stated_px,
-                ..*seen
-            })
-            .collect();
-        observe(camera, &stated, 0.5, |id| map.get(id)).expect("good detections")
-    }
-
     pub fn calibrate(&self) -> Calibration {
         calibrate(
             &self.believed_camera,
@@ -199,17 +185,32 @@ impl World {
             &self.frames,
             &self.settings,
         )
-        .map_err(|error| format!("seed {}: {error}", self.seed))
-        .expect("the data are good")
+        .expect("the recording is good")
     }
 
-    /// Returns the errors of the written markers, three rows each.
-    pub fn marker_errors(&self, found: &Calibration) -> nalgebra::DVector<f64> {
+    /// Returns the errors of a map's markers, three rows each.
+    pub fn marker_errors(&self, map: &MarkerMap) -> DVector<f64> {
         let truth = self.truth.markers();
-        nalgebra::DVector::from_fn(3 * truth.len(), |row, _| {
+        DVector::from_fn(3 * truth.len(), |row, _| {
             let marker = truth[row / 3];
-            let written = found.map.map.get(marker.id).expect("the same markers");
-            (marker.marker_in_tanker - written)[row % 3]
+            let there = map.get(marker.id).expect("the same markers");
+            (marker.marker_in_tanker - there)[row % 3]
         })
     }
+}
+
+/// Returns detections as the estimator takes them.
+pub fn observations(
+    camera: &Camera,
+    map: &MarkerMap,
+    detections: &[Detection],
+) -> Vec<Observation> {
+    let stated: Vec<Detection> = detections
+        .iter()
+        .map(|seen| Detection {
+            sigma_px: STATED_PX,
+            ..*seen
+        })
+        .collect();
+    observe(camera, &stated, STATED_PX, |id| map.get(id)).expect("good detections")
 }

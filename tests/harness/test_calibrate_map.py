@@ -107,7 +107,7 @@ def test_a_mount_without_attitudes_stays_and_the_report_says_why(
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     mount = [p for p in report["parameters"] if p["name"].startswith("mount")]
     assert [p["movement"] for p in mount] == ["no_attitudes"] * 3
-    assert "no attitudes of both aircraft" in mount[0]["reason"]
+    assert "no frame has attitudes of both aircraft" in mount[0]["reason"]
     assert "camera_mount" not in (folder / "parameters.yaml").read_text(encoding="utf-8")
 
 

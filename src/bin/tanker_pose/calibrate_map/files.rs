@@ -9,8 +9,11 @@ use tanker_pose::replay::Flight;
 
 use super::report;
 
-/// Largest sigma of a detection that the node's parameter takes, px, and the smallest.
+/// The smallest sigma of a detection that is worth stating, px, and the largest that the parameter takes.
 const SIGMAS_PX: [f64; 2] = [0.01, 100.0];
+
+/// The same of time constants of correlated noise, s.
+const TIMES_S: [f64; 2] = [1e-3, 1e4];
 
 /// A file that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +45,12 @@ pub fn write(folder: &Path, flight: &Flight, found: &Calibration) -> Result<(), 
         let mut info = flight.info.clone();
         if camera.is_moved {
             info = flight.info.with_change(&flight.camera, &camera.change);
-            put("camera.yaml", &info.to_yaml())?;
+            let path = put("camera.yaml", &info.to_yaml())?;
+            let _ = writeln!(
+                parameters,
+                "    # Map and budget hold only with the refined camera in camera_info: {}.",
+                quoted(&path)
+            );
         }
         let moved = flight.camera.with_change(&camera.change);
         let budget = info.budget_to_yaml(&moved, &camera.covariance);
@@ -67,7 +75,8 @@ pub fn write(folder: &Path, flight: &Flight, found: &Calibration) -> Result<(), 
         let _ = writeln!(
             parameters,
             "    correlated_noise_share: {:.4}\n    correlated_noise_time_s: {:.4}",
-            lasting.share, lasting.time_constant_s
+            lasting.share,
+            lasting.time_constant_s.clamp(TIMES_S[0], TIMES_S[1])
         );
     }
     if let Some(mount) = found.mount.as_ref().filter(|mount| mount.is_moved) {

@@ -15,6 +15,13 @@ use tanker_pose::target::{BodyChange, MapChange, MarkerMap, MarkerMapError};
 use crate::options::{self, CalibrationError};
 use crate::ros_options::RosOptions;
 
+/// Something was refined.
+const REFINED: u8 = 0;
+/// The data support nothing of what may be wrong.
+const NOT_TOLD: u8 = 1;
+/// An error.
+const FAILED: u8 = 2;
+
 /// Refine marker map, camera mount and camera from a recorded approach, with honest sigmas; measure the detector's noise.
 ///
 /// Topics, remaps and parameters are the node's, as in `replay`: -r from:=to, -p, --params-file after --ros-args. What is
@@ -84,24 +91,24 @@ enum Error {
     )]
     Rectified,
     #[error(
-        "--intrinsics has nothing to refine: no parameter of the camera has a sigma; state what may be wrong with \
-         `calibration_budget_file`, `focal_length_sigma`, `principal_point_sigma_px`, `k1_sigma` or `k2_sigma`"
+        "--intrinsics needs a sigma of what the calibration may have wrong: focal_length_sigma, principal_point_sigma_px, k1_sigma, k2_sigma or calibration_budget_file"
     )]
-    NoCameraSigma,
+    ExactCamera,
     #[error(transparent)]
     Files(#[from] files::FilesError),
 }
 
 /// Runs the tool; says on standard error what could not be read.
 pub fn run(arguments: &Arguments) -> ExitCode {
-    match refine(arguments) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+    let code = match refine(arguments) {
+        Ok(true) => REFINED,
+        Ok(false) => NOT_TOLD,
         Err(error) => {
             eprintln!("tanker_pose: {error}");
-            ExitCode::from(2)
+            FAILED
         }
-    }
+    };
+    ExitCode::from(code)
 }
 
 fn refine(arguments: &Arguments) -> Result<bool, Error> {
@@ -125,12 +132,16 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         replay = replay.with_map(map);
     }
     let recording = Recording::open(&arguments.recording)?;
-    let flight = replay.flight(recording, given, |_, _| {})?;
+    let flight = replay.flight(recording, given)?;
     for words in &flight.skipped {
         eprintln!("tanker_pose: skipped: {words}");
     }
     if arguments.intrinsics && flight.settings.rectified {
         return Err(Error::Rectified);
+    }
+    let budget = flight.estimator.budget();
+    if arguments.intrinsics && budget.is_none_or(|budget| budget.calibration().is_empty()) {
+        return Err(Error::ExactCamera);
     }
     let settings = CalibrationSettings {
         intrinsics: arguments.intrinsics,
@@ -144,9 +155,6 @@ fn refine(arguments: &Arguments) -> Result<bool, Error> {
         &flight.frames,
         &settings,
     )?;
-    if arguments.intrinsics && found.camera.is_none() {
-        return Err(Error::NoCameraSigma);
-    }
     let folder = arguments.output.clone().unwrap_or_else(|| {
         let mut name = arguments
             .recording

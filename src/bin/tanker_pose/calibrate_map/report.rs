@@ -98,7 +98,7 @@ pub fn say(found: &Calibration, folder: &Path) {
         noise.sigma_to_state_px()
     );
     if let Some((exponent, error)) = noise.growth_exponent {
-        println!("  grows with the range to the power {exponent:.2} ± {error:.2}");
+        println!("  growth with the range: to the power {exponent:.2} ± {error:.2}");
     }
     match noise.in_time {
         None => println!("  no correlation from frame to frame"),
@@ -123,7 +123,15 @@ pub fn say(found: &Calibration, folder: &Path) {
     for warning in &found.warnings {
         println!("warning: {warning}");
     }
+    if !is_anything_moved(found) {
+        println!("\nnothing was moved: the data support none of it");
+    }
     println!("\nwritten into {}", folder.display());
+    if found.camera.as_ref().is_some_and(|camera| camera.is_moved) {
+        println!(
+            "give camera.yaml to the camera's driver: map and budget hold only with it, and the node takes its camera from camera_info"
+        );
+    }
 }
 
 fn line(parameter: &Parameter) -> String {
