@@ -1,8 +1,6 @@
 //! Residuals of a frame, and their derivatives by its pose, the shake of its image and the shared unknowns.
 
-use nalgebra::{
-    Isometry3, Matrix2x3, Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3,
-};
+use nalgebra::{Isometry3, Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3};
 
 use super::unknowns::Unknowns;
 use crate::camera::{Camera, Ray};
@@ -79,16 +77,7 @@ impl Model<'_> {
             .matrix();
         let arm = rotation * marker;
         let q = arm + frame.camera_from_tanker.translation.vector;
-        if q.z <= 0.0 {
-            return None;
-        }
-        let ray = Ray {
-            x: q.x / q.z,
-            y: q.y / q.z,
-        };
-        let (pixel, by_ray) = camera.project(ray)?;
-        let by_point: Matrix2x3<f64> =
-            by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
+        let (pixel, by_point) = camera.project_point(&q)?;
         let mut by_own = SMatrix::<f64, 2, OWN>::zeros();
         by_own.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_point);
         by_own
@@ -105,7 +94,7 @@ impl Model<'_> {
             by_shared.push((column, by_marker * shift));
         }
         if !unknowns.camera.is_empty() {
-            let by_calibration = camera.pixel_by_calibration(ray)?;
+            let by_calibration = camera.pixel_by_calibration(Ray::through(&q))?;
             for (index, mode) in unknowns.camera.iter().enumerate() {
                 by_shared.push((
                     unknowns.first_of_camera + index,

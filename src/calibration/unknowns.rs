@@ -240,22 +240,19 @@ impl FlexColumns {
             None => (1, f64::INFINITY),
             Some(time_constant_s) => {
                 let spacing_s = time_constant_s / PER_TIME_CONSTANT;
-                let need = (length_s / spacing_s).ceil() + 1.0;
-                if used as f64 + need > MOST_AMPLITUDES as f64 {
+                // Saturates, and is then above the limit.
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let need = ((length_s / spacing_s).ceil() as usize).saturating_add(1);
+                if used.saturating_add(need) > MOST_AMPLITUDES {
                     return Err(CalibrateError::TooManyAmplitudes {
                         name: mode.name.clone(),
                         time_constant_s,
                         length_s,
-                        // Saturates, which is right for a message.
-                        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                        need: need as usize,
+                        need,
                         most: MOST_AMPLITUDES,
                     });
                 }
-                // At most as many as above.
-                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-                let count = need as usize;
-                (count, spacing_s)
+                (need, spacing_s)
             }
         };
         Ok(Self {

@@ -1,6 +1,6 @@
 //! The checked camera: conversion between pixels and rays.
 
-use nalgebra::{Matrix2, Point2};
+use nalgebra::{Matrix2, Matrix2x3, Point2, Vector3};
 
 use super::UndistortError;
 use super::distortion::{Lens, Outside};
@@ -21,6 +21,18 @@ pub struct Ray {
     pub x: f64,
     /// Down.
     pub y: f64,
+}
+
+impl Ray {
+    /// Returns the ray through a point in front of the camera, in the camera's axes.
+    #[inline]
+    #[must_use]
+    pub fn through(point: &Vector3<f64>) -> Self {
+        Self {
+            x: point.x / point.z,
+            y: point.y / point.z,
+        }
+    }
 }
 
 /// A checked camera: pinhole with or without lens distortion, for the pixels of the detections.
@@ -84,6 +96,21 @@ impl Camera {
             v: self.fy * distorted.y + self.cy,
         };
         (pixel.u.is_finite() && pixel.v.is_finite()).then_some((pixel, derivative))
+    }
+
+    /// Returns the pixel of a point in the camera's axes, m, and its 2×3 derivative by the point, px/m.
+    ///
+    /// `None` for a point that is not in front of the camera, and where [`Self::project`] is.
+    #[inline]
+    #[must_use]
+    pub fn project_point(&self, point: &Vector3<f64>) -> Option<(Pixel, Matrix2x3<f64>)> {
+        if point.z <= 0.0 {
+            return None;
+        }
+        let ray = Ray::through(point);
+        let (pixel, by_ray) = self.project(ray)?;
+        let ray_by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y);
+        Some((pixel, by_ray * ray_by_point / point.z))
     }
 
     /// Returns the distorted point, and the derivative of the pixel by the ideal one.

@@ -8,12 +8,12 @@
 //! to search for beacons, and in how large a window. So the last motion is kept beyond the end of its track. The
 //! attitude becomes uncertain first; it is then replaced by the nominal one, at the last range.
 
-use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix2x6, Matrix3, Rotation3};
+use nalgebra::{Isometry3, Matrix2, Matrix2x6, Matrix3, Rotation3};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::track::Tracker;
 use super::{Detection, FrameOutcome, Stamp};
-use crate::camera::{Camera, Pixel, Ray};
+use crate::camera::{Camera, Pixel};
 use crate::estimation::{PRIOR_SIGMA, Solution};
 use crate::geometry::{Motion, PoseCovariance, congruent, left_jacobian_inverse, pose_error, skew};
 use crate::target::Marker;
@@ -228,13 +228,8 @@ fn project(
     if q.z <= LEAST_DEPTH_SIGMAS * point_covariance[(2, 2)].max(0.0).sqrt() {
         return None;
     }
-    let ray = Ray {
-        x: q.x / q.z,
-        y: q.y / q.z,
-    };
-    let (pixel, pixel_by_ray) = camera.project(ray)?;
-    let ray_by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
-    let by_pose: Matrix2x6<f64> = pixel_by_ray * ray_by_point * point_by_pose;
+    let (pixel, by_point) = camera.project_point(&q)?;
+    let by_pose: Matrix2x6<f64> = by_point * point_by_pose;
     let detected = congruent(&by_pose, &covariance.0) + Matrix2::identity() * sigma_px.powi(2);
     detected
         .iter()

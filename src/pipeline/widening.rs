@@ -7,12 +7,12 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix2x3, Matrix2x6, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix2x6, Point3, Vector3};
 
 use super::residuals::MarkerResidual;
 use super::sigma_watch::ENOUGH;
 use super::window::Window;
-use crate::camera::{Camera, Ray};
+use crate::camera::Camera;
 use crate::estimation::FlexMode;
 use crate::geometry::skew;
 
@@ -166,13 +166,7 @@ fn scatter(
 fn derivative(sight: &Sight, id: u32, marker: &Point3<f64>) -> Option<DMatrix<f64>> {
     let pose = sight.camera_from_tanker;
     let q = pose * marker;
-    let ray = Ray {
-        x: q.x / q.z,
-        y: q.y / q.z,
-    };
-    let (_, by_ray) = (q.z > 0.0).then(|| sight.camera.project(ray))??;
-    let by_point: Matrix2x3<f64> =
-        by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
+    let (_, by_point) = sight.camera.project_point(&q.coords)?;
     let arm = pose.rotation * marker.coords;
     let mut by_pose = Matrix2x6::zeros();
     by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_point);

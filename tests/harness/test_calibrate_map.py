@@ -8,19 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from harness import paper
+from harness.marker_maps import write_marker_map
 from harness.processes import binary, child_environment
 
-MAP = """name: tanker
-sigma: 0.05
-markers:
-  - {id: 1, x: 3.7,  y: -7.13,  z: 0.7}
-  - {id: 2, x: 3.7,  y: 7.13,   z: 0.7}
-  - {id: 3, x: 7.79, y: -2.689, z: 0.7}
-  - {id: 4, x: 7.79, y: 2.689,  z: 0.7}
-  - {id: 5, x: 7.96, y: 0.0,    z: 3.189}
-  - {id: 6, x: 0.0,  y: 0.0,    z: 0.0}
-"""
-MARKERS = 6
+SURVEY_SIGMA_M = 0.05
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -38,8 +30,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def flight(tmp_path: Path) -> tuple[Path, Path]:
     """An approach to a tanker that is drawn from its map's sigmas, and the map."""
-    surveyed = tmp_path / "tanker.yaml"
-    surveyed.write_text(MAP, encoding="utf-8")
+    surveyed = write_marker_map(tmp_path / "tanker.yaml", paper.MARKERS, sigma_m=SURVEY_SIGMA_M)
     bag = tmp_path / "approach.mcap"
     simulated = run(
         *("simulate", "--bag", str(bag), "--marker-map", str(surveyed), "--draw-tanker"),
@@ -66,15 +57,15 @@ def test_the_refined_map_fits_its_recording_and_the_nodes_code_accepts_all_files
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert report["used_frames"] >= 0.9 * report["frames"]
     # Eighteen coordinates of which seven combinations are not told.
-    assert len(report["parameters"]) == 3 * MARKERS
-    assert sum(p["movement"] == "moved" for p in report["parameters"]) >= 2 * MARKERS
+    assert len(report["parameters"]) == 3 * len(paper.MARKERS)
+    assert sum(p["movement"] == "moved" for p in report["parameters"]) >= 2 * len(paper.MARKERS)
     shifts = [mode for mode in report["gauge"] if mode["name"].startswith("shift")]
     assert [mode["told"] for mode in shifts] == [False] * 3
     noise = report["noise"]
     assert abs(noise["sigma_px"] - 0.4) < 4.0 * noise["sigma_error_px"]
 
     refined = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
-    assert all(0.0 < marker["sigma"] < 0.05 for marker in refined["markers"])
+    assert all(0.0 < marker["sigma"] < SURVEY_SIGMA_M for marker in refined["markers"])
     assert [mode["name"] for mode in refined["flex"]][0] == "map_error_1"
 
     replayed = outcomes(

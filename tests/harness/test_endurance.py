@@ -7,12 +7,12 @@ import os
 import signal
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
 
 from harness import messages, paper
+from harness.burden import MEBIBYTE, Burden
 from harness.conftest import StartEstimator, StartNode
 from harness.estimator import Estimator
 from harness.peer import RELIABLE, Peer
@@ -21,32 +21,11 @@ from harness.processes import Process
 SOAK_S = float(os.environ.get("TANKER_POSE_SOAK_S", "15"))
 RESTARTS = int(os.environ.get("TANKER_POSE_RESTARTS", "12"))
 RATE_HZ = 200
-MEBIBYTE = 2**20
 # What an allocator keeps back varies by this much; a leak of 100 bytes a frame shows within ten minutes.
 MOST_GROWTH = 4 * MEBIBYTE
 MOST_MEMORY = 30 * MEBIBYTE
 EXIT_WITHIN_S = 1.0
 DETECTOR = Path(__file__).parent / "fixtures" / "detector.py"
-
-
-@dataclass(frozen=True)
-class Burden:
-    """What a process holds."""
-
-    memory: int
-    threads: int
-    descriptors: int
-
-    @classmethod
-    def of(cls, process: Process) -> "Burden":
-        seen = psutil.Process(process.pid)
-        return cls(seen.memory_info().rss, seen.num_threads(), seen.num_fds())
-
-    def __str__(self) -> str:
-        return (
-            f"{self.memory / MEBIBYTE:.1f} MiB, {self.threads} threads, "
-            f"{self.descriptors} descriptors"
-        )
 
 
 def test_frames_by_the_thousand_leave_memory_threads_and_descriptors_flat(

@@ -4,9 +4,9 @@ import itertools
 import socket
 
 import numpy as np
-import psutil
 
 from harness import messages
+from harness.burden import MEBIBYTE, Burden
 from harness.estimator import Estimator
 from harness.rtps_packets import hostile, participant, udp_ports
 
@@ -15,7 +15,6 @@ PACKETS = 20_000
 BURST = 50
 PARTICIPANTS = 2_000
 LEASE_S = 3
-MEBIBYTE = 2**20
 MOST_GROWTH = 40 * MEBIBYTE
 # Of the middleware about what it could not read: a burst, and one a second.
 MOST_LINES = 200
@@ -31,43 +30,36 @@ def send_bursts(estimator: Estimator, packets: list[bytes]) -> None:
             estimator.expect_pose(messages.exact_frame(estimator.next_index()))
 
 
-def resident_bytes(estimator: Estimator) -> int:
-    return psutil.Process(estimator.process.pid).memory_info().rss
-
-
-def threads(estimator: Estimator) -> int:
-    return psutil.Process(estimator.process.pid).num_threads()
-
-
 def test_random_and_mutated_packets_do_not_keep_the_node_from_its_frames(
     estimator: Estimator, rng: np.random.Generator
 ) -> None:
     estimator.expect_pose(messages.exact_frame(estimator.next_index()))
-    before = threads(estimator), resident_bytes(estimator)
+    before = Burden.of(estimator.process)
 
     send_bursts(estimator, list(itertools.islice(hostile(rng), PACKETS)))
 
     # A thread of the middleware that has panicked would be missing.
-    assert threads(estimator) == before[0], estimator.process.log
+    after = Burden.of(estimator.process)
+    assert after.threads == before.threads, estimator.process.log
     assert "panicked" not in estimator.process.log, estimator.process.log
     assert len(estimator.process.log.splitlines()) < MOST_LINES
-    grown = resident_bytes(estimator) - before[1]
+    grown = after.memory - before.memory
     print(f"{PACKETS} packets: grown by {grown / MEBIBYTE:.1f} MiB")
     assert grown < MOST_GROWTH
 
 
-def test_participants_that_do_not_exist_cost_memory_only_until_their_lease_ends(
+def test_participants_that_do_not_exist_cost_no_frame_and_little_memory(
     estimator: Estimator, rng: np.random.Generator
 ) -> None:
     estimator.expect_pose(messages.exact_frame(estimator.next_index()))
-    before = threads(estimator), resident_bytes(estimator)
+    before = Burden.of(estimator.process)
 
     for round_number in range(3):
         send_bursts(estimator, [participant(rng.bytes(12), 9, LEASE_S) for _ in range(PARTICIPANTS)])
-        grown = resident_bytes(estimator) - before[1]
+        grown = Burden.of(estimator.process).memory - before.memory
         print(f"round {round_number}: grown by {grown / MEBIBYTE:.1f} MiB")
         estimator.peer.spin_for(2 * LEASE_S)
 
-    assert threads(estimator) == before[0], estimator.process.log
+    assert Burden.of(estimator.process).threads == before.threads, estimator.process.log
     assert "panicked" not in estimator.process.log, estimator.process.log
     assert grown < MOST_GROWTH

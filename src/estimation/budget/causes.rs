@@ -5,7 +5,7 @@ use nalgebra::{
 };
 
 use super::ErrorBudget;
-use crate::camera::{CALIBRATION_SIZE, Camera, Ray};
+use crate::camera::{CALIBRATION_SIZE, Camera};
 use crate::estimation::{Observation, Solution};
 use crate::geometry::{PoseCovariance, skew};
 
@@ -255,13 +255,7 @@ fn row(
     let pose = &solution.camera_from_tanker;
     let q = pose * seen.marker_in_tanker;
     let residual = seen.residual_px(camera, pose)?;
-    let ray = Ray {
-        x: q.x / q.z,
-        y: q.y / q.z,
-    };
-    let (_, by_ray) = camera.project(ray)?;
-    let by_point: Matrix2x3<f64> =
-        by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
+    let (_, by_point) = camera.project_point(&q.coords)?;
     let arm = pose.rotation * seen.marker_in_tanker.coords;
     let mut by_pose = Matrix2x6::zeros();
     by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&by_point);

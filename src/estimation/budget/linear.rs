@@ -1,10 +1,10 @@
 //! A frame linearised at its solution, in sigmas: what protection levels are computed from.
 
-use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 use smallvec::SmallVec;
 
 use super::{ErrorBudget, MAX_MODES};
-use crate::camera::{Camera, Ray};
+use crate::camera::Camera;
 use crate::estimation::Observation;
 use crate::geometry::skew;
 use nalgebra::Isometry3;
@@ -60,16 +60,7 @@ impl LinearFrame {
         for seen in used {
             let arm = rotation * seen.marker_in_tanker.coords;
             let q = arm + pose.translation.vector;
-            if q.z <= 0.0 {
-                return None;
-            }
-            let ray = Ray {
-                x: q.x / q.z,
-                y: q.y / q.z,
-            };
-            let (pixel, by_ray) = camera.project(ray)?;
-            let by_point: Matrix2x3<f64> =
-                by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
+            let (pixel, by_point) = camera.project_point(&q)?;
             let marker = budget.and_then(|budget| budget.marker(seen.id, &mut place));
             let survey_m = marker.map_or(0.0, |marker| marker.survey_sigma_m);
             let own = Matrix2::from_diagonal_element(seen.sigma_px.powi(2))

@@ -2,11 +2,11 @@
 
 use std::ops::Div;
 
-use nalgebra::{Matrix2x3, Point3};
+use nalgebra::Point3;
 
 use super::frame::{FrameBudget, MODES, NOISE, SURVEY, WEIGHT};
 use super::gram::{Elimination, Gram};
-use crate::camera::{Camera, Ray};
+use crate::camera::Camera;
 use crate::estimation::Observation;
 use crate::estimation::centred_pose::CentredPose;
 use crate::estimation::lanes::four::{
@@ -446,15 +446,7 @@ fn sight_through(
 ) -> Option<Sight<f64>> {
     let arm = pose.rotation * (seen.marker_in_tanker - markers_mean);
     let q = arm + pose.centre_in_camera;
-    if q.z <= 0.0 {
-        return None;
-    }
-    let ray = Ray {
-        x: q.x / q.z,
-        y: q.y / q.z,
-    };
-    let (pixel, by_ray) = camera.project(ray)?;
-    let d = by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
+    let (pixel, d) = camera.project_point(&q)?;
     Some(Sight {
         arm: [arm.x, arm.y, arm.z],
         by_point: [[d.m11, d.m12, d.m13], [d.m21, d.m22, d.m23]],
