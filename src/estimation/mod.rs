@@ -173,10 +173,7 @@ impl Observation {
         if q.z <= 0.0 {
             return None;
         }
-        let (pixel, _) = camera.project(Ray {
-            x: q.x / q.z,
-            y: q.y / q.z,
-        })?;
+        let (pixel, _) = camera.project(Ray::through(&q.coords))?;
         Some(Vector2::new(pixel.u - self.pixel.u, pixel.v - self.pixel.v))
     }
 }

@@ -20,10 +20,7 @@ pub fn cramer_rao_bound(scene: &Scene, sigma_px: f64) -> Option<PoseCovariance> 
         if q.z <= 0.0 {
             continue;
         }
-        let ray = Ray {
-            x: q.x / q.z,
-            y: q.y / q.z,
-        };
+        let ray = Ray::through(&q);
         let (_, pixel_by_ray) = scene.camera().project(ray)?;
         let by_point = pixel_by_ray * Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / q.z;
         let by_turn = -by_point * skew(arm);

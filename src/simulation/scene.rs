@@ -121,10 +121,7 @@ impl Scene {
                 if q.z <= 0.0 {
                     return None;
                 }
-                let (pixel, _) = self.camera.project(Ray {
-                    x: q.x / q.z,
-                    y: q.y / q.z,
-                })?;
+                let (pixel, _) = self.camera.project(Ray::through(&q.coords))?;
                 Some(Observation {
                     id: marker.id,
                     marker_in_tanker: marker.marker_in_tanker,

@@ -152,10 +152,7 @@ impl World {
                 if q.z <= 0.0 {
                     return None;
                 }
-                let ray = Ray {
-                    x: q.x / q.z,
-                    y: q.y / q.z,
-                };
+                let ray = Ray::through(&q.coords);
                 let (mut pixel, _) = self.camera.project(ray)?;
                 pixel.u += jitter[0] + noise[0];
                 pixel.v += jitter[1] + noise[1];

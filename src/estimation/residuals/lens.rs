@@ -45,10 +45,7 @@ impl Sums<f64> {
         if q.z <= 0.0 {
             return None;
         }
-        let ray = Ray {
-            x: q.x / q.z,
-            y: q.y / q.z,
-        };
+        let ray = Ray::through(&q);
         let (pixel, by_ray) = camera.project(ray)?;
         let whitening = 1.0 / seen.sigma_px;
         let by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y);
